@@ -231,7 +231,7 @@ Result<IdentifyConfig> with_known(const RunConfig& config) {
     if (!settings) {
       return tl::unexpected(settings.error());
     }
-    result.known = {modes_of(settings->dynamics_x), modes_of(settings->dynamics_y)};
+    result.known = {modes_of(settings->dynamics.x), modes_of(settings->dynamics.y)};
   }
   return result;
 }

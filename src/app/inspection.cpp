@@ -48,7 +48,7 @@ void write_counts(Sink out, const Inspection& i) {
   fmt::format_to(out, "moves         {}, {} extruding, {} of filament alone, {} arcs\n", i.moves,
                  i.extruding_moves, i.extrude_only_moves, i.arcs);
   fmt::format_to(out, "extent        X {:.3f} to {:.3f}, Y {:.3f} to {:.3f}, Z to {:.3f} mm\n",
-                 i.x_min_mm, i.x_max_mm, i.y_min_mm, i.y_max_mm, i.z_max_mm);
+                 i.min_mm.x, i.max_mm.x, i.min_mm.y, i.max_mm.y, i.z_max_mm);
   fmt::format_to(out, "path          {:.0f} mm, filament {:.2f} mm ({} extrusion)\n",
                  i.path_length_mm, i.filament_mm, i.absolute_e ? "absolute" : "relative");
 }
@@ -75,8 +75,8 @@ void write_limits(Sink out, const Inspection& i, const machine::Settings& s) {
                  to_string(s.printer.firmware), readable(s.limits.max_velocity_mm_s),
                  readable(s.limits.max_accel_mm_s2),
                  readable(s.limits.square_corner_velocity_mm_s));
-  fmt::format_to(out, "dynamics      X {}; Y {}\n", s.dynamics_x.description(),
-                 s.dynamics_y.description());
+  fmt::format_to(out, "dynamics      X {}; Y {}\n", s.dynamics.x.description(),
+                 s.dynamics.y.description());
 }
 
 // Each key that is not at its default, or every key, with its value in force when the print starts,
@@ -158,10 +158,10 @@ std::string inspection_json(const Inspection& i, const std::string& input,
   json["unknown_commands"] = report::unknown_json(i.unknown_commands);
   json["step_rates"] = report::step_rates_json(i.step_rates, /*has_output=*/false);
   json["extrusion"] = {{"input_mm", i.filament_mm}};
-  json["extent_mm"] = {{"x_min", i.x_min_mm},
-                       {"x_max", i.x_max_mm},
-                       {"y_min", i.y_min_mm},
-                       {"y_max", i.y_max_mm},
+  json["extent_mm"] = {{"x_min", i.min_mm.x},
+                       {"x_max", i.max_mm.x},
+                       {"y_min", i.min_mm.y},
+                       {"y_max", i.max_mm.y},
                        {"z_max", i.z_max_mm}};
   json["warnings"] = i.warnings;
   return report::dump(json);

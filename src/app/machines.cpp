@@ -12,6 +12,7 @@
 #include "outputs.hpp"
 #include "record_densities.hpp"
 #include "results.hpp"
+#include "unflex/core/axes.hpp"
 #include "unflex/identify/axis_model.hpp"
 #include "unflex/platform/names.hpp"
 #include "unflex/study/study_machines.hpp"
@@ -94,34 +95,38 @@ study::MachineAxis machine_axis(const Pair& pair) {
   return {pair.known->name, pair.machine->name, pair.truth, pair.shapers};
 }
 
+constexpr Axes<Axis> kAxes{Axis::x, Axis::y};
+
 // A machine on the bench; its settings are still to be read.
 struct Candidate {
   std::string name;
-  Pair x;
-  Pair y;
+  Axes<Pair> axes;
 
   [[nodiscard]] std::vector<std::string> overrides() const {
     Identification found;
-    found.axes[Axis::x] = *x.known->model;
-    found.axes[Axis::y] = *y.known->model;
+    for_each_axis([&](Axis axis, const Pair& pair) { found.axes[axis] = *pair.known->model; },
+                  kAxes, axes);
     return dynamics_overrides(found);
   }
 };
 
-using KnownAxes = std::array<std::vector<KnownAxis>, 2>;
+using KnownAxes = Axes<std::vector<KnownAxis>>;
 
 std::vector<Candidate> candidates(const std::string& name, const KnownAxes& axes) {
   std::vector<Candidate> result;
-  const std::optional<Pair> x = alone(axes[0]);
-  const std::optional<Pair> y = alone(axes[1]);
-  if (!x || !y) {
+  const auto is_found = [](const std::optional<Pair>& pair) { return pair.has_value(); };
+  const auto found = map_axes(alone, axes);
+  if (!all_axes(is_found, found)) {
     return result;
   }
-  result.push_back({name, *x, *y});
-  const std::optional<Pair> other_x = across(axes[0], *x);
-  const std::optional<Pair> other_y = across(axes[1], *y);
-  if (other_x || other_y) {
-    result.push_back({name + ", next record", other_x.value_or(*x), other_y.value_or(*y)});
+  const Axes<Pair> own = map_axes([](const std::optional<Pair>& pair) { return *pair; }, found);
+  result.push_back({name, own});
+  const auto others = map_axes(across, axes, own);
+  if (any_axis(is_found, others)) {
+    result.push_back(
+        {name + ", next record", map_axes([](const std::optional<Pair>& other,
+                                             const Pair& pair) { return other.value_or(pair); },
+                                          others, own)});
   }
   return result;
 }
@@ -137,10 +142,9 @@ RunConfig with_axes(RunConfig config, const Candidate& candidate) {
 KnownAxes known_axes(const MachineRecords& records, const identify::Sweep& sweep,
                      std::vector<std::string>& warnings) {
   KnownAxes axes;
-  for (std::size_t i = 0; i < axes.size(); ++i) {
+  for (std::size_t i = 0; i < axes.kCount; ++i) {
     for (const DataSet& set : records.axes[i]) {
-      const KnownAxis& known =
-          axes[i].emplace_back(known_axis(set, i == 0 ? Axis::x : Axis::y, sweep));
+      const KnownAxis& known = axes[i].emplace_back(known_axis(set, kAxes[i], sweep));
       if (!known.model) {
         warnings.push_back(fmt::format("{}: warning: is left out: {}", set.name, known.refusal));
       }
@@ -180,8 +184,7 @@ Result<ExitCode> run_machines(const RunConfig& config, Console& console) {
     if (!settings) {
       return tl::unexpected(settings.error());
     }
-    known.push_back({candidate.name, std::move(*settings), machine_axis(candidate.x),
-                     machine_axis(candidate.y)});
+    known.push_back({candidate.name, std::move(*settings), map_axes(machine_axis, candidate.axes)});
   }
   const Result<flow::Job> job = job_of(config, *space);
   if (!job) {

@@ -31,7 +31,7 @@ struct Printer {
 
 // What the settings say of an axis. Several modes are more than a tower shows.
 Result<tune::Knowledge> knowledge_of(const machine::Settings& settings, std::size_t axis) {
-  const machine::AxisDynamics& dynamics = axis == 0 ? settings.dynamics_x : settings.dynamics_y;
+  const machine::AxisDynamics& dynamics = settings.dynamics[axis];
   const std::string section = fmt::format("dynamics.{}.", kLetters[axis]);
   if (!dynamics.modes.empty()) {
     return fail(ErrorKind::usage,
@@ -60,10 +60,9 @@ Result<machine::Settings> load_settings(const RunConfig& config, const machine::
     return settings;
   }
   const std::vector<std::pair<std::string, std::string>> origins = settings->origins;
-  for (const char letter : kLetters) {
-    const std::string key = fmt::format("dynamics.{}.freq_hz", letter);
-    if (!is_given(*settings, key) &&
-        (letter == 'x' ? settings->dynamics_x : settings->dynamics_y).modes.empty()) {
+  for (std::size_t axis = 0; axis < kLetters.size(); ++axis) {
+    const std::string key = fmt::format("dynamics.{}.freq_hz", kLetters[axis]);
+    if (!is_given(*settings, key) && settings->dynamics[axis].modes.empty()) {
       sources.overrides.push_back(fmt::format("{}={}", key, machine::AxisDynamics{}.freq_hz));
     }
   }

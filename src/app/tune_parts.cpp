@@ -7,11 +7,11 @@
 #include <istream>
 #include <memory>
 #include <sstream>
-#include <tuple>
 #include <utility>
 
 #include "inputs.hpp"
 #include "outputs.hpp"
+#include "unflex/core/axes.hpp"
 #include "unflex/core/firmware_spec.hpp"
 
 namespace unflex::app {
@@ -82,23 +82,22 @@ void center_on_bed(const machine::Settings& settings, tune::Codes& codes) {
   const auto middle = [](const std::optional<machine::Range>& travel) {
     return travel ? 0.5 * (travel->min + travel->max) : 0.5 * kSmallBed_mm;
   };
-  codes.center_x_mm = middle(settings.printer.travel_x_mm);
-  codes.center_y_mm = middle(settings.printer.travel_y_mm);
+  codes.center_mm = map_axes(middle, settings.printer.travel_mm);
 }
 
 // Whether the tower and its brim are on the bed.
 Status check_place(const machine::Settings& settings, const tune::Tower& tower,
                    const tune::Codes& codes) {
   const double half_mm = 0.5 * tower.side_mm + tower.brim_mm;
-  for (const auto& [key, travel, center_mm] :
-       {std::tuple("printer.travel_x_mm", settings.printer.travel_x_mm, codes.center_x_mm),
-        std::tuple("printer.travel_y_mm", settings.printer.travel_y_mm, codes.center_y_mm)}) {
+  for (std::size_t axis = 0; axis < XY::kCount; ++axis) {
+    const std::optional<machine::Range>& travel = settings.printer.travel_mm[axis];
+    const double center_mm = codes.center_mm[axis];
     // Where the tool may be is not known of every printer. The user's own print was there.
     if (travel && (center_mm - half_mm < travel->min || center_mm + half_mm > travel->max)) {
       return fail(ErrorKind::usage,
-                  fmt::format("the tower needs {:.0f} mm around {:.0f} mm, which {} does not "
-                              "leave; it says where the tool may be",
-                              2.0 * half_mm, center_mm, key));
+                  fmt::format("the tower needs {:.0f} mm around {:.0f} mm, which "
+                              "printer.travel_{}_mm does not leave; it says where the tool may be",
+                              2.0 * half_mm, center_mm, kAxisKeys[axis]));
     }
   }
   return {};
@@ -165,7 +164,8 @@ Result<TowerSite> first_site(const RunConfig& config, const LoadSettings& load) 
   } else {
     site->codes = tune::plain_codes(*config.tune.nozzle_temp_c, config.tune.bed_temp_c);
   }
-  if (!text || (site->settings.printer.travel_x_mm && site->settings.printer.travel_y_mm)) {
+  if (!text || all_axes([](const auto& travel) { return travel.has_value(); },
+                        site->settings.printer.travel_mm)) {
     center_on_bed(site->settings, site->codes);
   }
   return site;

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "contour_kernel.hpp"
@@ -24,10 +26,9 @@ std::vector<Edge> edges_of(const std::vector<PathVertex>& path) {
   std::vector<Edge> edges;
   for (std::size_t i = 0; i < path.size(); ++i) {
     const PathVertex& next = path[std::min(i + 1, path.size() - 1)];
-    const double dx = next.x_mm - path[i].x_mm;
-    const double dy = next.y_mm - path[i].y_mm;
-    const double square = dx * dx + dy * dy;
-    edges.push_back({path[i].x_mm, path[i].y_mm, dx, dy, square > 0.0 ? 1.0 / square : 0.0});
+    const XY way_mm = next.place_mm - path[i].place_mm;
+    const double square = squared(way_mm);
+    edges.push_back({path[i].place_mm, way_mm, square > 0.0 ? 1.0 / square : 0.0});
   }
   return edges;
 }
@@ -73,24 +74,23 @@ std::vector<Reach> reaches_of(const RunWindow& window) {
 // once, since its matrix does not depend on the aims.
 class AimedAxis {
  public:
-  // model_of: of each pair. along: ε + λ of each sample. All of them must stay where they are.
-  AimedAxis(AxisWindow& window, const std::vector<ModelPair>& pairs,
-            std::size_t ModelPair::*model_of, const std::vector<double>& along,
-            const ContourKernel& kernel)
+  // axis: its number in a pair. along: ε + λ of each sample. All of them must stay where they are.
+  AimedAxis(AxisWindow& window, const std::vector<ModelPair>& pairs, std::size_t axis,
+            const std::vector<double>& along, const ContourKernel& kernel)
       : window_(window), along_(along), kernel_(kernel) {
     scaled_.assign(window_);
     form_.assign(scaled_);
     ready_ = form_.factor({});
-    of_pair_.assign(kernel.pair_places(), pairs.front().*model_of);
+    of_pair_.assign(kernel.pair_places(), pairs.front()[axis]);
     parts_.resize(kernel.pair_places() * form_.model_places());
     std::fill_n(parts_.data(), parts_.size(), 0.0);
     std::vector<double> shares(window_.models());
     for (const ModelPair& pair : pairs) {
-      shares[pair.*model_of] += pair.share;
+      shares[pair[axis]] += pair.share;
     }
     // A model that no pair holds has no share, and keeps r as its aim.
     for (std::size_t c = 0; c < pairs.size(); ++c) {
-      const std::size_t model = pairs[c].*model_of;
+      const std::size_t model = pairs[c][axis];
       of_pair_[c] = model;
       if (shares[model] > 0.0) {
         parts_[c * form_.model_places() + model] = pairs[c].share / shares[model];
@@ -189,27 +189,34 @@ std::vector<ModelShare> by_frequency(const AxisSetup& setup) {
 }
 
 // Adds the pairs that give each model its share and that go through both lists in their order.
-void add_in_order(std::vector<ModelShare> x, std::vector<ModelShare> y, double weight,
+void add_in_order(const Axes<std::vector<ModelShare>>& models, double weight,
                   std::vector<ModelPair>& pairs) {
   constexpr double kNothing = 1e-9;
-  std::size_t i = 0;
-  std::size_t j = 0;
-  while (i < x.size() && j < y.size()) {
-    const double share = std::min(x[i].share, y[j].share);
+  using Models = std::span<const ModelShare>;
+  Axes<Models> left = map_axes([](const auto& all) { return Models(all); }, models);
+  Axes<double> left_share = map_axes([](Models all) { return all.front().share; }, left);
+  const auto is_used_up = [](Models all) { return all.empty(); };
+  while (!any_axis(is_used_up, left)) {
+    const double share = least_of_axes(std::identity{}, left_share);
+    const Axes<std::size_t> of_axes = map_axes([](Models all) { return all.front().model; }, left);
     if (share > kNothing) {
-      const auto known = std::ranges::find_if(pairs, [&](const ModelPair& pair) {
-        return pair.x == x[i].model && pair.y == y[j].model;
-      });
+      const auto known = std::ranges::find_if(
+          pairs, [&](const Axes<std::size_t>& pair) { return pair == of_axes; });
       if (known == pairs.end()) {
-        pairs.push_back({x[i].model, y[j].model, weight * share});
+        pairs.push_back({of_axes, weight * share});
       } else {
         known->share += weight * share;
       }
     }
-    x[i].share -= share;
-    y[j].share -= share;
-    i += x[i].share <= kNothing ? 1 : 0;
-    j += y[j].share <= kNothing ? 1 : 0;
+    for_each_axis(
+        [&](Models& all, double& of_first) {
+          of_first -= share;
+          if (of_first <= kNothing) {
+            all = all.subspan(1);
+            of_first = all.empty() ? 0.0 : all.front().share;
+          }
+        },
+        left, left_share);
   }
 }
 
@@ -220,7 +227,7 @@ std::vector<PathVertex> path_of(const Course& course, double origin_s, double pe
   double time_s = origin_s - planner::duration_s(course.before);
   const gcode::Position* direction = nullptr;  // of the last move in X and Y
   const auto add = [&](const gcode::Position& place, bool sharp) {
-    path.push_back({place[gcode::X], place[gcode::Y], 2.0 * time_s / period_s, sharp});
+    path.push_back({xy_of(place), 2.0 * time_s / period_s, sharp});
   };
   for (const Course::Moves& moves : {course.before, course.moves, course.after}) {
     for (const planner::PlannedMove& move : moves) {
@@ -228,7 +235,7 @@ std::vector<PathVertex> path_of(const Course& course, double origin_s, double pe
         add(move.position_mm(0.0), true);
       }
       time_s += move.duration_s();
-      const bool is_flat = move.direction[gcode::X] != 0.0 || move.direction[gcode::Y] != 0.0;
+      const bool is_flat = xy_of(move.direction) != XY{};
       if (is_flat && direction != nullptr && planner::turns_sharply(*direction, move.direction)) {
         path.back().is_sharp = true;
       }
@@ -254,13 +261,13 @@ std::vector<PathVertex> part_of(const std::vector<PathVertex>& path, std::size_t
   return part;
 }
 
-std::vector<ModelPair> pairs_of(const AxisSetup& x, const AxisSetup& y) {
+std::vector<ModelPair> pairs_of(const Axes<AxisSetup>& setup) {
   constexpr double kOppositeWays = 0.3;
   std::vector<ModelPair> pairs;
-  std::vector<ModelShare> of_y = by_frequency(y);
-  add_in_order(by_frequency(x), of_y, 1.0 - kOppositeWays, pairs);
-  std::ranges::reverse(of_y);
-  add_in_order(by_frequency(x), of_y, kOppositeWays, pairs);
+  Axes<std::vector<ModelShare>> models = map_axes(by_frequency, setup);
+  add_in_order(models, 1.0 - kOppositeWays, pairs);
+  std::ranges::reverse(models.y);
+  add_in_order(models, kOppositeWays, pairs);
   return pairs;
 }
 
@@ -271,27 +278,29 @@ FreeSolutions aim(RunWindow& window) {
   const std::vector<Reach> reaches = reaches_of(window);
   const std::vector<double> along = along_weights(window);
   for (std::size_t i = 0; i < along.size(); ++i) {
-    window.x.weight[i] *= 1.0 + along[i];
-    window.y.weight[i] *= 1.0 + along[i];
+    for_each_axis([&](AxisWindow& axis) { axis.weight[i] *= 1.0 + along[i]; }, window);
   }
-  AimedAxis x(window.x, pairs, &ModelPair::x, along, *kernel);
-  AimedAxis y(window.y, pairs, &ModelPair::y, along, *kernel);
-  if (!x.is_ready() || !y.is_ready()) {
+  Axes<std::unique_ptr<AimedAxis>> axes;
+  for (std::size_t axis = 0; axis < axes.kCount; ++axis) {
+    axes[axis] = std::make_unique<AimedAxis>(window[axis], pairs, axis, along, *kernel);
+  }
+  if (!all_axes([](const auto& axis) { return axis->is_ready(); }, axes)) {
     return {};
   }
-  PairPlaces q{x.reference(), y.reference(), {}};
+  PairPlaces q{map_axes([](const auto& axis) { return axis->reference(); }, axes), {}};
   q.vertex.resize(q.x.place_mm.size());
   std::fill_n(q.vertex.data(), q.vertex.size(), 0.0);
-  x.solve_first();
-  y.solve_first();
+  for_each_axis([](auto& axis) { axis->solve_first(); }, axes);
   for (int round = 0;; ++round) {
-    const double farthest_mm =
-        kernel->follow(edges, reaches, x.nozzles(), y.nozzles(), round < kWideRounds, q);
+    const auto nozzles = map_axes([](const auto& axis) { return axis->nozzles(); }, axes);
+    const double farthest_mm = kernel->follow(edges, reaches, nozzles, round < kWideRounds, q);
     if (farthest_mm < kSettled_mm || round + 1 == kRounds) {
-      return {x.finish(q.x), y.finish(q.y)};
+      return map_axes(
+          [](const auto& axis, const PairCoordinate& of_axis) { return axis->finish(of_axis); },
+          axes, q);
     }
-    x.follow(q.x);
-    y.follow(q.y);
+    for_each_axis([](auto& axis, const PairCoordinate& of_axis) { axis->follow(of_axis); }, axes,
+                  q);
   }
 }
 

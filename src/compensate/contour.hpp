@@ -39,7 +39,7 @@ namespace unflex::compensate {
 
 // Finds q, and sets aims and weights of the window. Its limits do not count for q. Returns the
 // optimum of each axis without limits, where rounding lets it be found.
-using FreeSolutions = std::array<std::optional<AxisSolution>, 2>;
+using FreeSolutions = Axes<std::optional<AxisSolution>>;
 FreeSolutions aim(RunWindow& window);
 
 }  // namespace unflex::compensate

@@ -9,15 +9,14 @@
 #include <vector>
 
 #include "lane_array.hpp"
+#include "unflex/core/xy.hpp"
 
 namespace unflex::compensate {
 
 // An edge of the path: from a vertex to the next.
 struct Edge {
-  double x_mm = 0.0;
-  double y_mm = 0.0;
-  double dx_mm = 0.0;
-  double dy_mm = 0.0;
+  XY begin_mm;
+  XY way_mm;
   double inverse_square = 0.0;  // of its length; 0 if it has none
 };
 
@@ -34,9 +33,7 @@ struct PairCoordinate {
   LaneArray way_mm;
 };
 
-struct PairPlaces {
-  PairCoordinate x;
-  PairCoordinate y;
+struct PairPlaces : Axes<PairCoordinate> {
   LaneArray vertex;  // where the edge begins that q lies on
 };
 
@@ -67,8 +64,7 @@ class ContourKernel {
   // Takes q farther towards the places nearest to the nozzles: everywhere within the reach, or near
   // where it was. Returns the longest way that a q went, mm.
   virtual double follow(const std::vector<Edge>& edges, const std::vector<Reach>& reach,
-                        const PairNozzles& x, const PairNozzles& y, bool everywhere,
-                        PairPlaces& q) const = 0;
+                        const Axes<PairNozzles>& nozzle, bool everywhere, PairPlaces& q) const = 0;
   // Aims of each model at the nodes and in the middles behind them.
   virtual void set_aims(const AimRule& rule, const LaneArray& q_mm, std::size_t nodes,
                         LaneArray& node_aims_mm, LaneArray& middle_aims_mm) const = 0;

@@ -13,8 +13,7 @@ class LaneContour final : public ContourKernel {
   [[nodiscard]] std::size_t pair_places() const override { return kLanes * groups(); }
 
   double follow(const std::vector<Edge>& edges, const std::vector<Reach>& reach,
-                const PairNozzles& x, const PairNozzles& y, bool everywhere,
-                PairPlaces& q) const override {
+                const Axes<PairNozzles>& nozzle, bool everywhere, PairPlaces& q) const override {
     // Edges that are looked at beside that of the round before.
     constexpr std::size_t kAround = 2;
     const std::size_t places = pair_places();
@@ -38,22 +37,22 @@ class LaneContour final : public ContourKernel {
       }
       for (std::size_t group = 0; group < groups(); ++group) {
         const std::size_t place = k * places + kLanes * group;
-        const Lanes px = nozzles(x, k, group);
-        const Lanes py = nozzles(y, k, group);
-        Lanes near_x = broadcast<Lanes>(edges[from].x_mm);
-        Lanes near_y = broadcast<Lanes>(edges[from].y_mm);
+        const Lanes px = nozzles(nozzle.x, k, group);
+        const Lanes py = nozzles(nozzle.y, k, group);
+        Lanes near_x = broadcast<Lanes>(edges[from].begin_mm.x);
+        Lanes near_y = broadcast<Lanes>(edges[from].begin_mm.y);
         Lanes vertex = broadcast<Lanes>(static_cast<double>(from));
         Lanes least = square(near_x - px, near_y - py);
         const Lanes none = broadcast<Lanes>(0.0);
         const Lanes all = broadcast<Lanes>(1.0);
         for (std::size_t i = from; i < to; ++i) {
           const Edge& edge = edges[i];
-          const Lanes begin_x = broadcast<Lanes>(edge.x_mm);
-          const Lanes begin_y = broadcast<Lanes>(edge.y_mm);
-          const Lanes along = edge.dx_mm * (px - begin_x) + edge.dy_mm * (py - begin_y);
+          const Lanes begin_x = broadcast<Lanes>(edge.begin_mm.x);
+          const Lanes begin_y = broadcast<Lanes>(edge.begin_mm.y);
+          const Lanes along = edge.way_mm.x * (px - begin_x) + edge.way_mm.y * (py - begin_y);
           const Lanes share = smaller(larger(edge.inverse_square * along, none), all);
-          const Lanes place_x = begin_x + edge.dx_mm * share;
-          const Lanes place_y = begin_y + edge.dy_mm * share;
+          const Lanes place_x = begin_x + edge.way_mm.x * share;
+          const Lanes place_y = begin_y + edge.way_mm.y * share;
           const Lanes away = square(place_x - px, place_y - py);
           const auto is_nearer = less(away, least);
           least = select(is_nearer, away, least);

@@ -35,8 +35,7 @@ class Reference {
   }
 
   struct Sample {
-    double x_mm;
-    double y_mm;
+    XY place_mm;
     double weight;
   };
 
@@ -48,7 +47,7 @@ class Reference {
     }
     const gcode::Position p = move().position_mm(t - start_s_);
     const bool moving = t >= start_s_ && t <= start_s_ + move().duration_s();
-    return {p[gcode::X], p[gcode::Y], moving && move().segment.extruding() ? 1.0 : travel_weight_};
+    return {xy_of(p), moving && move().segment.extruding() ? 1.0 : travel_weight_};
   }
 
  private:
@@ -182,26 +181,24 @@ namespace {
 
 // How long base and nozzle need after an uneven motion until they go along with an even one.
 double settling_s(const Setup& setup, double period_s) {
-  double longest_s = 0.0;
-  for (const BaseLimits& limits : {setup.x.limits, setup.y.limits}) {
-    // Zero if jerk is not limited. If acceleration is not limited, the ratio is not finite and
-    // counts as no time.
-    const double ramp_s = limits.max_accel_mm_s2 / limits.max_jerk_mm_s3;
-    longest_s = std::max(longest_s, std::isfinite(ramp_s) ? 2.0 * ramp_s : 0.0);
-  }
+  // Zero if jerk is not limited. If acceleration is not limited, the ratio is not finite and counts
+  // as no time.
+  const double longest_s = most_of_axes(
+      [](const AxisSetup& axis) {
+        const double ramp_s = axis.limits.max_accel_mm_s2 / axis.limits.max_jerk_mm_s3;
+        return std::isfinite(ramp_s) ? 2.0 * ramp_s : 0.0;
+      },
+      setup);
   return std::max(setup.overlap_s + longest_s, static_cast<double>(kBlendNodes + 1) * period_s);
 }
 
 bool leaves_room(const planner::PlannedMove& move, const Setup& setup) {
-  const auto axis_fits = [&](gcode::Axis axis, const BaseLimits& limits) {
-    return std::abs(move.direction[axis]) * move.cruise_v_mm_s <=
-           kRoomToSettle * limits.max_velocity_mm_s;
+  const auto fits = [&](double direction, const AxisSetup& axis) {
+    return direction * move.cruise_v_mm_s <= kRoomToSettle * axis.limits.max_velocity_mm_s;
   };
-  const double both = std::abs(move.direction[gcode::X]) + std::abs(move.direction[gcode::Y]);
-  const bool motors_fit =
-      !setup.shares_motors ||
-      both * move.cruise_v_mm_s <= kRoomToSettle * setup.x.limits.max_velocity_mm_s;
-  return motors_fit && axis_fits(gcode::X, setup.x.limits) && axis_fits(gcode::Y, setup.y.limits);
+  const XY direction = map_axes([](double part) { return std::abs(part); }, xy_of(move.direction));
+  const bool motors_fit = !setup.shares_motors || fits(taxicab(direction), setup.x);
+  return motors_fit && all_axes(fits, direction, setup);
 }
 
 // The cruises, where nothing needs solving, in the order of the course.
@@ -274,15 +271,14 @@ std::vector<RunWindow> windows(const Course& course, const std::vector<WindowSpa
   // Twice as many samples as nodes, from the first node of the first window.
   const std::size_t first_sample = 2 * spans[first].first;
   const std::size_t last_sample = 2 * spans[first + count - 1].last;
-  std::vector<double> x;
-  std::vector<double> y;
+  Axes<std::vector<double>> reference_mm;
   std::vector<double> weight;
   const bool from_rest = course.before.empty();
   Reference reference(course, origin_s(course, grid, setup), setup);
   for (std::size_t i = first_sample; i <= last_sample; ++i) {
     const Reference::Sample sample = reference.at(0.5 * static_cast<double>(i) * grid.period_s);
-    x.push_back(sample.x_mm);
-    y.push_back(sample.y_mm);
+    for_each_axis([](std::vector<double>& all, double place) { all.push_back(place); },
+                  reference_mm, sample.place_mm);
     weight.push_back(sample.weight);
   }
   if (course.after.empty()) {
@@ -300,8 +296,12 @@ std::vector<RunWindow> windows(const Course& course, const std::vector<WindowSpa
           all.begin() + static_cast<std::ptrdiff_t>(2 * span.first - first_sample),
           all.begin() + static_cast<std::ptrdiff_t>(2 * span.last + 1 - first_sample));
     };
-    RunWindow window{make_axis(setup.x, setup, grid.period_s, slice(x), slice(weight)),
-                     make_axis(setup.y, setup, grid.period_s, slice(y), slice(weight)),
+    RunWindow window{map_axes(
+                         [&](const AxisSetup& axis, const std::vector<double>& of_axis_mm) {
+                           return make_axis(axis, setup, grid.period_s, slice(of_axis_mm),
+                                            slice(weight));
+                         },
+                         setup, reference_mm),
                      setup.shares_motors,
                      setup.contour,
                      {}};
@@ -310,12 +310,14 @@ std::vector<RunWindow> windows(const Course& course, const std::vector<WindowSpa
                             2.0 * setup.contour->reach_s / grid.period_s);
     }
     if (from_rest && span.first == 0) {
-      window.x.start = AxisWindow::Start{nozzle.x, window.x.reference_mm.front()};
-      window.y.start = AxisWindow::Start{nozzle.y, window.y.reference_mm.front()};
+      for_each_axis(
+          [](AxisWindow& axis, const dynamics::NozzleState& state) {
+            axis.start = AxisWindow::Start{state, axis.reference_mm.front()};
+          },
+          window, nozzle);
     }
     if (course.after.empty() && span.last == spans.back().last) {
-      window.x.end_base_mm = window.x.reference_mm.back();
-      window.y.end_base_mm = window.y.reference_mm.back();
+      for_each_axis([](AxisWindow& axis) { axis.end_base_mm = axis.reference_mm.back(); }, window);
     }
     result.push_back(std::move(window));
   }
@@ -350,7 +352,8 @@ void prepare(const Engine& divider, const WindowSpan& span, RunWindow& window) {
 
 AxisSolutions solve(const Engine& engine, const WindowSpan& span, RunWindow& window) {
   if (span.cruise) {
-    return {along(window.x), along(window.y)};
+    return map_axes([](const AxisWindow& axis) { return Result<AxisSolution>(along(axis)); },
+                    window);
   }
   const FreeSolutions free = window.contour ? aim(window) : FreeSolutions{};
   if (window.shares_motors) {
@@ -361,7 +364,29 @@ AxisSolutions solve(const Engine& engine, const WindowSpan& span, RunWindow& win
     return without && broken(without->base, axis) == ActiveLimits{} ? Result<AxisSolution>(*without)
                                                                     : engine.solve(axis);
   };
-  return {solved(window.x, free[0]), solved(window.y, free[1])};
+  return map_axes(solved, window, free);
+}
+
+Result<dynamics::BaseTrajectory> solve_all(const Engine& engine,
+                                           const std::vector<WindowSpan>& spans,
+                                           std::vector<RunWindow>& windows,
+                                           const std::function<void(const AxisSolution&)>& each) {
+  Axes<std::vector<dynamics::AxisTrajectory>> solutions;
+  for (std::size_t i = 0; i < windows.size(); ++i) {
+    AxisSolutions solved = solve(engine, spans[i], windows[i]);
+    for (std::size_t axis = 0; axis < solved.kCount; ++axis) {
+      if (!solved[axis]) {
+        return tl::unexpected(std::move(solved[axis].error()));
+      }
+      if (each) {
+        each(*solved[axis]);
+      }
+      solutions[axis].push_back(std::move(solved[axis]->base));
+    }
+  }
+  return dynamics::BaseTrajectory{
+      map_axes([&](const auto& of_axis) { return join(spans, of_axis); }, solutions),
+      windows.front().x.period_s};
 }
 
 dynamics::AxisTrajectory join(const std::vector<WindowSpan>& spans,

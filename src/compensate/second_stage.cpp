@@ -21,12 +21,9 @@ dynamics::ShaperPulses both(const dynamics::ShaperPulses& a, const dynamics::Sha
   return result;
 }
 
-std::pair<dynamics::ShaperPulses, dynamics::ShaperPulses> pulses_of(const Setup& setup) {
-  if (setup.shares_motors) {
-    const dynamics::ShaperPulses joint = both(setup.x.pulses, setup.y.pulses);
-    return {joint, joint};
-  }
-  return {setup.x.pulses, setup.y.pulses};
+Axes<dynamics::ShaperPulses> pulses_of(const Setup& setup) {
+  return setup.shares_motors ? on_all_axes(both(setup.x.pulses, setup.y.pulses))
+                             : map_axes([](const AxisSetup& axis) { return axis.pulses; }, setup);
 }
 
 double reach_s(const dynamics::ShaperPulses& pulses) {
@@ -75,18 +72,22 @@ dynamics::AxisTrajectory shaped(const dynamics::AxisTrajectory& base, double h,
 }  // namespace
 
 std::size_t nodes_of_shaping(const Setup& setup, double period_s) {
-  const auto [x, y] = pulses_of(setup);
-  return static_cast<std::size_t>(std::ceil(std::max(reach_s(x), reach_s(y)) / period_s));
+  return static_cast<std::size_t>(std::ceil(most_of_axes(reach_s, pulses_of(setup)) / period_s));
 }
 
 dynamics::BaseTrajectory shaped(const dynamics::BaseTrajectory& base, const Setup& setup,
                                 std::size_t more_before, std::size_t more_after) {
-  const auto [x, y] = pulses_of(setup);
-  if (x.empty() && y.empty() && more_before + more_after == 0) {
+  const Axes<dynamics::ShaperPulses> pulses = pulses_of(setup);
+  const auto is_empty = [](const dynamics::ShaperPulses& of_axis) { return of_axis.empty(); };
+  if (all_axes(is_empty, pulses) && more_before + more_after == 0) {
     return base;
   }
-  return {base.period_s, shaped(base.x, base.period_s, x, more_before, more_after),
-          shaped(base.y, base.period_s, y, more_before, more_after)};
+  return {map_axes(
+              [&](const dynamics::AxisTrajectory& axis, const dynamics::ShaperPulses& of_axis) {
+                return shaped(axis, base.period_s, of_axis, more_before, more_after);
+              },
+              base, pulses),
+          base.period_s};
 }
 
 }  // namespace unflex::compensate

@@ -18,17 +18,25 @@ constexpr double kGain = 0.01;
 // A relative excess up to this is rounding.
 constexpr double kSlack = 1e-6;
 
+// What both axes do at the nodes: their velocities, or their accelerations.
+using Nodes = std::vector<double> dynamics::AxisTrajectory::*;
+
 bool is_solved(const AxisSolutions& solutions) {
-  return solutions[0].has_value() && solutions[1].has_value();
+  return all_axes([](const auto& solution) { return solution.has_value(); }, solutions);
 }
 
 double objective(const AxisSolutions& solutions) {
-  return solutions[0]->objective + solutions[1]->objective;
+  return sum_of_axes([](const auto& solution) { return solution->objective; }, solutions);
 }
 
-bool exceeds(const std::vector<double>& x, const std::vector<double>& y, double limit) {
-  for (std::size_t k = 0; k < x.size(); ++k) {
-    if (std::abs(x[k]) + std::abs(y[k]) > limit * (1.0 + kSlack)) {
+Axes<double> at_node(const AxisSolutions& solutions, Nodes nodes, std::size_t k) {
+  return map_axes([&](const auto& solution) { return std::abs((solution->base.*nodes)[k]); },
+                  solutions);
+}
+
+bool exceeds(const AxisSolutions& solutions, Nodes nodes, double limit) {
+  for (std::size_t k = 0; k < (solutions.x->base.*nodes).size(); ++k) {
+    if (taxicab(at_node(solutions, nodes, k)) > limit * (1.0 + kSlack)) {
       return true;
     }
   }
@@ -36,51 +44,50 @@ bool exceeds(const std::vector<double>& x, const std::vector<double>& y, double 
 }
 
 // Divides a limit between the axes at all nodes, by what each axis does there.
-void divide(const std::vector<double>& x, const std::vector<double>& y, double limit,
-            std::vector<double>& limit_of_x, std::vector<double>& limit_of_y) {
-  limit_of_x.resize(x.size());
-  limit_of_y.resize(x.size());
-  for (std::size_t k = 0; k < x.size(); ++k) {
-    const double of_x = std::abs(x[k]);
-    const double of_y = std::abs(y[k]);
+void divide(const AxisSolutions& solutions, Nodes nodes, double limit,
+            std::vector<double> AxisWindow::*limit_at, RunWindow& window) {
+  for_each_axis([&](AxisWindow& axis) { (axis.*limit_at).resize(axis.nodes()); }, window);
+  for (std::size_t k = 0; k < window.x.nodes(); ++k) {
+    const auto [of_x, of_y] = at_node(solutions, nodes, k);
     const double left = limit - of_x - of_y;
-    limit_of_x[k] = left > 0.0 ? of_x + 0.5 * left : limit * of_x / (of_x + of_y);
-    limit_of_y[k] = limit - limit_of_x[k];
+    const double limit_of_x = left > 0.0 ? of_x + 0.5 * left : limit * of_x / (of_x + of_y);
+    (window.x.*limit_at)[k] = limit_of_x;
+    (window.y.*limit_at)[k] = limit - limit_of_x;
   }
 }
 
 void halve(RunWindow& window) {
-  for (AxisWindow* const axis : {&window.x, &window.y}) {
-    axis->max_velocity_at_mm_s.assign(axis->nodes(), 0.5 * axis->limits.max_velocity_mm_s);
-    axis->max_accel_at_mm_s2.assign(axis->nodes(), 0.5 * axis->limits.max_accel_mm_s2);
-  }
+  for_each_axis(
+      [](AxisWindow& axis) {
+        axis.max_velocity_at_mm_s.assign(axis.nodes(), 0.5 * axis.limits.max_velocity_mm_s);
+        axis.max_accel_at_mm_s2.assign(axis.nodes(), 0.5 * axis.limits.max_accel_mm_s2);
+      },
+      window);
 }
 
 }  // namespace
 
 AxisSolutions solve_with_shared_motors(const Engine& engine, RunWindow& window) {
   const auto solve_both = [&] {
-    return AxisSolutions{engine.solve(window.x), engine.solve(window.y)};
+    return map_axes([&](const AxisWindow& axis) { return engine.solve(axis); }, window);
   };
   const BaseLimits& limits = window.x.limits;
   AxisSolutions best = solve_both();
   bool divided = false;
   for (int round = 0; round < kMostRounds && is_solved(best); ++round) {
-    const dynamics::AxisTrajectory& x = best[0]->base;
-    const dynamics::AxisTrajectory& y = best[1]->base;
-    const bool too_fast = exceeds(x.velocity_mm_s, y.velocity_mm_s, limits.max_velocity_mm_s);
-    const bool too_quick = exceeds(x.accel_mm_s2, y.accel_mm_s2, limits.max_accel_mm_s2);
+    constexpr Nodes kVelocity = &dynamics::AxisTrajectory::velocity_mm_s;
+    constexpr Nodes kAccel = &dynamics::AxisTrajectory::accel_mm_s2;
+    const bool too_fast = exceeds(best, kVelocity, limits.max_velocity_mm_s);
+    const bool too_quick = exceeds(best, kAccel, limits.max_accel_mm_s2);
     if (!divided && !too_fast && !too_quick) {
       break;
     }
     const RunWindow before = window;
     if (too_fast || !window.x.max_velocity_at_mm_s.empty()) {
-      divide(x.velocity_mm_s, y.velocity_mm_s, limits.max_velocity_mm_s,
-             window.x.max_velocity_at_mm_s, window.y.max_velocity_at_mm_s);
+      divide(best, kVelocity, limits.max_velocity_mm_s, &AxisWindow::max_velocity_at_mm_s, window);
     }
     if (too_quick || !window.x.max_accel_at_mm_s2.empty()) {
-      divide(x.accel_mm_s2, y.accel_mm_s2, limits.max_accel_mm_s2, window.x.max_accel_at_mm_s2,
-             window.y.max_accel_at_mm_s2);
+      divide(best, kAccel, limits.max_accel_mm_s2, &AxisWindow::max_accel_at_mm_s2, window);
     }
     AxisSolutions next = solve_both();
     const bool solved = is_solved(next);

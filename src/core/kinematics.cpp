@@ -86,11 +86,11 @@ bool Motors::shared_by_xy() const {
   return std::ranges::any_of(rows_, [](const auto& row) { return row[0] != 0.0 && row[1] != 0.0; });
 }
 
-double Motors::largest_of_xy(double x, double y, double z) const {
+double Motors::largest_of_xy(const Axes<double>& xy, double z) const {
   double largest = 0.0;
   for (std::size_t i = 0; i < kCount; ++i) {
     if (moves_xy(i)) {
-      largest = std::max(largest, std::abs(of(i, x, y, z)));
+      largest = std::max(largest, std::abs(of(i, xy.x, xy.y, z)));
     }
   }
   return largest;

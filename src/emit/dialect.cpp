@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <functional>
 #include <utility>
 #include <variant>
 
@@ -108,11 +109,14 @@ std::vector<std::string> shaper_lines(Firmware firmware, const gcode::Shaper& wa
                                       const gcode::Shaper& current) {
   std::vector<std::string> lines;
   // What is not known cannot be set.
-  const bool x_is_other =
-      spec_of(firmware).filters.shapes_both_axes_alike || wanted.freq_x_hz != current.freq_x_hz;
-  const bool x = !wanted.unknown_x && (current.unknown_x || x_is_other);
-  const bool y = !wanted.unknown_y && (current.unknown_y || wanted.freq_y_hz != current.freq_y_hz);
-  dialect_of(firmware).shaper_lines(wanted, current, {x, y}, lines);
+  ShaperAxes axes =
+      map_axes([](bool unknown, bool was_unknown, double freq_hz,
+                  double was_hz) { return !unknown && (was_unknown || freq_hz != was_hz); },
+               wanted.unknown, current.unknown, wanted.freq_hz, current.freq_hz);
+  if (spec_of(firmware).filters.shapes_both_axes_alike) {
+    axes.x = !wanted.unknown.x;
+  }
+  dialect_of(firmware).shaper_lines(wanted, current, axes, lines);
   return lines;
 }
 
@@ -125,9 +129,10 @@ std::string advance_line(Firmware firmware, const gcode::PressureAdvance& wanted
 
 std::string unknown_shaper_lines(Firmware firmware, const gcode::Shaper& wanted,
                                  const gcode::Shaper& current) {
-  const bool x = wanted.unknown_x && !current.unknown_x;
-  const bool y = wanted.unknown_y && !current.unknown_y;
-  return x || y ? dialect_of(firmware).unknown_shaper_lines({x, y}) : "";
+  const ShaperAxes axes =
+      map_axes([](bool unknown, bool was_unknown) { return unknown && !was_unknown; },
+               wanted.unknown, current.unknown);
+  return any_axis(std::identity{}, axes) ? dialect_of(firmware).unknown_shaper_lines(axes) : "";
 }
 
 }  // namespace unflex::emit

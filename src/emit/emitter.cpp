@@ -4,6 +4,7 @@
 
 #include <cctype>
 #include <cmath>
+#include <functional>
 #include <utility>
 
 #include "dialect.hpp"
@@ -60,8 +61,8 @@ AxisGrid axis_grid(const planner::FirmwareConfig& config, gcode::Axis axis, doub
 }
 
 Grid grid_of(const RunStart& start, const planner::FirmwareConfig& config) {
-  return {axis_grid(config, X, start.zero_mm[X]), axis_grid(config, Y, start.zero_mm[Y]),
-          axis_grid(config, Z, start.zero_mm[Z]), start.speed_factor, start.zeroes_e};
+  const auto grid = [&](gcode::Axis axis) { return axis_grid(config, axis, start.zero_mm[axis]); };
+  return {{grid(X), grid(Y)}, grid(Z), start.speed_factor, start.zeroes_e};
 }
 
 bool changes(const gcode::Event& event, const planner::Limits& limits) {
@@ -351,8 +352,8 @@ void Emitter::write_stroke(const Stroke& stroke, double filament_origin, std::st
       append_coordinate(text, letter, position - state.base_mm[a]);
     }
   };
-  axis(X, 'X', stroke.x_mm);
-  axis(Y, 'Y', stroke.y_mm);
+  axis(X, 'X', stroke.place_mm.x);
+  axis(Y, 'Y', stroke.place_mm.y);
   if (state.known[Z]) {
     // If the height is unknown, the run's moves do not change it.
     axis(Z, 'Z', stroke.z_mm);
@@ -465,8 +466,7 @@ void Emitter::switch_shaper_off(std::string& out) {
   const gcode::ModalState& state = printer_.state();
   gcode::Shaper current = state.input_shaper();
   if (gcode::may_come_on(options_.fixed.firmware, input_.state().input_shaper())) {
-    current.unknown_x = current.unknown_x || state.shaper_touched_x;
-    current.unknown_y = current.unknown_y || state.shaper_touched_y;
+    current.unknown = map_axes(std::logical_or{}, current.unknown, state.shaper_touched);
   }
   set_shaper({}, current, out);
 }

@@ -34,11 +34,10 @@ LinesInTime lines_in_time(const gcode::Position& start_mm, const std::vector<dou
                           const std::vector<Stroke>& strokes) {
   LinesInTime result;
   result.times_s.push_back(ends_s.front() - strokes.front().end_s);
-  Stroke before{.x_mm = start_mm[X], .y_mm = start_mm[Y]};
+  Stroke before{.place_mm = xy_of(start_mm)};
   for (std::size_t i = 0; i < strokes.size(); ++i) {
     result.times_s.push_back(ends_s[i]);
-    result.lengths_mm.push_back(
-        math::hypot(strokes[i].x_mm - before.x_mm, strokes[i].y_mm - before.y_mm));
+    result.lengths_mm.push_back(distance(before.place_mm, strokes[i].place_mm));
     before = strokes[i];
   }
   return result;

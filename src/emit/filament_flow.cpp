@@ -48,10 +48,10 @@ void level_flow(const gcode::Position& start_mm, double most_mm_s, std::span<Str
     double filament_mm;
   };
   std::vector<LineFlow> lines;
-  Stroke before{0.0, start_mm[X], start_mm[Y], start_mm[Z]};
+  Stroke before{0.0, xy_of(start_mm), start_mm[Z]};
   for (const Stroke& stroke : strokes) {
-    const double length = math::hypot(stroke.x_mm - before.x_mm, stroke.y_mm - before.y_mm,
-                                      stroke.z_mm - before.z_mm);
+    const double length =
+        math::hypot(distance(before.place_mm, stroke.place_mm), stroke.z_mm - before.z_mm);
     lines.push_back({length, length / (stroke.end_s - before.end_s), stroke.e_mm - before.e_mm});
     before = stroke;
   }

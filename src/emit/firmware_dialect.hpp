@@ -14,10 +14,7 @@
 namespace unflex::emit {
 
 // Which axes' shapers are to be written.
-struct ShaperAxes {
-  bool x = false;
-  bool y = false;
-};
+using ShaperAxes = Axes<bool>;
 
 struct FirmwareDialect {
   // Appends the lines that put `wanted` in force in the place of `current`.

@@ -68,13 +68,13 @@ StepMatrix::StepMatrix(const dynamics::FlexibleAxis& axis, std::size_t mode, dou
   column(3, {}, {0.0, 1.0, 0.0});
 }
 
-Followed::Followed(const dynamics::BaseTrajectory& base, BaseAxis axis,
+Followed::Followed(const dynamics::BaseTrajectory& base, std::size_t axis,
                    const dynamics::FlexibleAxis& nozzle)
     : Followed(base, axis, nozzle,
-               nozzle.riding(base.at(base.*axis, 0.0).position_mm,
-                             base.at(base.*axis, 0.0).velocity_mm_s)) {}
+               nozzle.riding(base.at(base[axis], 0.0).position_mm,
+                             base.at(base[axis], 0.0).velocity_mm_s)) {}
 
-Followed::Followed(const dynamics::BaseTrajectory& base, BaseAxis axis,
+Followed::Followed(const dynamics::BaseTrajectory& base, std::size_t axis,
                    const dynamics::FlexibleAxis& nozzle, const NozzleState& start)
     : modes_(nozzle.mode_count()), period_s_(base.period_s) {
   const dynamics::NodeMap map(nozzle, base.period_s);
@@ -82,7 +82,7 @@ Followed::Followed(const dynamics::BaseTrajectory& base, BaseAxis axis,
   NozzleState state = start;
   note(state);
   for (std::size_t k = 0; k + 1 < base.nodes(); ++k) {
-    map.advance(base.*axis, k, state);
+    map.advance(base[axis], k, state);
     note(state);
   }
 }

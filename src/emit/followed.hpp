@@ -12,7 +12,6 @@
 namespace unflex::emit {
 
 // BaseTrajectory::x or y.
-using BaseAxis = dynamics::AxisTrajectory dynamics::BaseTrajectory::*;
 
 // States of a nozzle of kModes modes as vectors: (q_1, q̇_1, …).
 template <int kModes>
@@ -62,9 +61,9 @@ class StepMatrix {
 // a given state.
 class Followed {
  public:
-  Followed(const dynamics::BaseTrajectory& base, BaseAxis axis,
+  Followed(const dynamics::BaseTrajectory& base, std::size_t axis,
            const dynamics::FlexibleAxis& nozzle);
-  Followed(const dynamics::BaseTrajectory& base, BaseAxis axis,
+  Followed(const dynamics::BaseTrajectory& base, std::size_t axis,
            const dynamics::FlexibleAxis& nozzle, const dynamics::NozzleState& start);
 
   [[nodiscard]] dynamics::NozzleState at(double t) const;

@@ -108,7 +108,7 @@ Candidates::Candidates(const BaseTrajectory& base, const std::function<ErrorWeig
   weights_.reserve(count);
   for (std::size_t k = 0; k < count; ++k) {
     const double t = time_s(k);
-    base_.emplace_back(base.x_at(t).position_mm, base.y_at(t).position_mm);
+    base_.push_back(vector(base.position_mm(t)));
     weights_.push_back(weight(t));
   }
 }
@@ -125,10 +125,10 @@ LineCosts<kModes>::LineCosts(const BaseTrajectory& base,
   const auto longest = static_cast<std::size_t>(std::ceil(rules.max_line_s / dt_s())) + 1;
   for (std::size_t axis = 0; axis < 2; ++axis) {
     Axis& all = axes_[axis];
-    all.models = models_for(axis == 0 ? rules.nozzle_x : rules.nozzle_y, rules.freq_error);
+    all.models = models_for(rules.nozzle[axis], rules.freq_error);
     std::vector<Followed> follow;
     for (const FlexibleAxis& model : all.models) {
-      follow.emplace_back(base, axis == 0 ? &BaseTrajectory::x : &BaseTrajectory::y, model);
+      follow.emplace_back(base, axis, model);
     }
     all.at.reserve(size());
     for (std::size_t k = 0; k < size(); ++k) {

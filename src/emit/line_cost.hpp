@@ -126,6 +126,13 @@ struct NozzleAnswers {
   }
 };
 
+[[nodiscard]] inline Eigen::Vector2d vector(const XY& xy) { return {xy.x, xy.y}; }
+// This member of each axis' value.
+template <typename T>
+[[nodiscard]] Eigen::Vector2d of_axes(const Axes<T>& values, double T::*member) {
+  return vector(map_axes([&](const T& value) { return value.*member; }, values));
+}
+
 // The candidate times, equally spaced, and the base there.
 class Candidates {
  public:

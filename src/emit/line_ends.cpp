@@ -30,19 +30,20 @@ constexpr double kOwnShare = 0.8;
 constexpr double kShareAtNodes = 0.4;
 
 // e at `steps` + 1 points, equally spaced over the line. steps is no more than kMaxSamples.
-std::array<double, kMaxSamples + 1> nozzle_error(const FlexibleAxis& axis, BaseAxis at,
+std::array<double, kMaxSamples + 1> nozzle_error(const FlexibleAxis& axis,
+                                                 const dynamics::AxisTrajectory& of_base,
                                                  const BaseTrajectory& base, double from,
                                                  double duration, int steps) {
   std::array<double, kMaxSamples + 1> d{};
   const auto weight = [&](int i) { return i == 0 || i == steps ? 0.5 : 1.0; };
   const auto s = [&](int i) { return static_cast<double>(i) / steps - 0.5; };
-  const double origin = base.at(base.*at, from).position_mm;
+  const double origin = base.at(of_base, from).position_mm;
   double sum = 0.0;
   double moment = 0.0;
   double inertia = 0.0;
   for (int i = 0; i <= steps; ++i) {
     double& value = d[static_cast<std::size_t>(i)];
-    value = base.at(base.*at, from + (s(i) + 0.5) * duration).position_mm - origin;
+    value = base.at(of_base, from + (s(i) + 0.5) * duration).position_mm - origin;
     sum += weight(i) * value;
     moment += weight(i) * s(i) * value;
     inertia += weight(i) * s(i) * s(i);
@@ -73,11 +74,14 @@ double largest_nozzle_error_mm(const BaseTrajectory& base, double from, double t
   const double duration = to - from;
   const int steps =
       std::clamp(static_cast<int>(std::ceil(2.0 * duration / base.period_s)), 6, kMaxSamples);
-  const auto x = nozzle_error(rules.nozzle_x, &BaseTrajectory::x, base, from, duration, steps);
-  const auto y = nozzle_error(rules.nozzle_y, &BaseTrajectory::y, base, from, duration, steps);
+  const auto errors = map_axes(
+      [&](const FlexibleAxis& axis, const dynamics::AxisTrajectory& of_base) {
+        return nozzle_error(axis, of_base, base, from, duration, steps);
+      },
+      rules.nozzle, base);
   double largest2 = 0.0;
   for (std::size_t i = 0; i <= static_cast<std::size_t>(steps); ++i) {
-    largest2 = std::max(largest2, x[i] * x[i] + y[i] * y[i]);
+    largest2 = std::max(largest2, squared(XY{errors.x[i], errors.y[i]}));
   }
   return std::sqrt(largest2);
 }
@@ -105,14 +109,10 @@ double change_over(const BaseTrajectory& base, double from, double to, double li
                    const Motors& motors) {
   double most = 0.0;
   for (double t = std::max(from, line_s); t < to + base.period_s; t += base.period_s) {
-    const auto change = [&](BaseAxis axis) {
-      const auto speed = [&](double at) {
-        return base.at(base.*axis, std::min(at, base.duration_s())).velocity_mm_s;
-      };
-      return speed(t) - speed(t - line_s);
+    const auto speed_mm_s = [&](double at) {
+      return base.velocity_mm_s(std::min(at, base.duration_s()));
     };
-    most = std::max(
-        most, motors.largest_of_xy(change(&BaseTrajectory::x), change(&BaseTrajectory::y), 0.0));
+    most = std::max(most, motors.largest_of_xy(speed_mm_s(t) - speed_mm_s(t - line_s)));
   }
   return most;
 }
@@ -139,16 +139,10 @@ class Candidate {
   // The largest change of a motor's speed where lines from a to b and from b to c join. A line
   // without time stands for rest.
   [[nodiscard]] double change(double a, double b, double c) const {
-    const auto along = [&](BaseAxis axis) {
-      const auto speed = [&](double from, double to) {
-        return from < to ? (base_->at(base_->*axis, to).position_mm -
-                            base_->at(base_->*axis, from).position_mm) /
-                               (to - from)
-                         : 0.0;
-      };
-      return speed(b, c) - speed(a, b);
+    const auto speed_mm_s = [&](double from, double to) {
+      return from < to ? (base_->position_mm(to) - base_->position_mm(from)) / (to - from) : XY{};
     };
-    return rules_->motors.largest_of_xy(along(&BaseTrajectory::x), along(&BaseTrajectory::y), 0.0);
+    return rules_->motors.largest_of_xy(speed_mm_s(b, c) - speed_mm_s(a, b));
   }
 
   const BaseTrajectory* base_;
@@ -191,9 +185,7 @@ bool long_enough(const BaseTrajectory& base, double from, double to, const LineR
   if (rules.min_line_mm <= 0.0) {
     return true;
   }
-  const double dx = base.x_at(to).position_mm - base.x_at(from).position_mm;
-  const double dy = base.y_at(to).position_mm - base.y_at(from).position_mm;
-  return std::max(std::abs(dx), std::abs(dy)) >= rules.min_line_mm;
+  return largest_part(base.position_mm(to) - base.position_mm(from)) >= rules.min_line_mm;
 }
 
 bool cuts_well(const BaseTrajectory& base, double from, double to, const LineRules& rules) {
@@ -255,30 +247,35 @@ void append_line_ends(const BaseTrajectory& base, double from, double to, const 
   times.push_back(to);
 }
 
-bool split_lines(const BaseTrajectory& base, const std::vector<double>& x_error_mm,
-                 const std::vector<double>& y_error_mm, const LineRules& rules,
-                 std::vector<double>& times) {
+bool split_lines(const BaseTrajectory& base, const Axes<AxisVertices>& vertices,
+                 const LineRules& rules, std::vector<double>& times) {
   // Errors of lines add up, with any sign, for as long as the nozzle rings.
   constexpr double kAddedUp = 4.0;
   const double most = kAddedUp * rules.tolerance_mm;
-  const auto off = [&](std::size_t i) { return math::hypot(x_error_mm[i], y_error_mm[i]) > most; };
+  const auto off = [&](std::size_t i) {
+    return length(map_axes([&](const AxisVertices& axis) { return axis.nozzle_error_mm[i]; },
+                           vertices)) > most;
+  };
   return halve(base, rules, true, times,
                [&](std::size_t i) { return off(i) || (i + 1 < times.size() && off(i + 1)); });
 }
 
-bool split_quick_joins(const BaseTrajectory& base, const std::vector<double>& x_mm,
-                       const std::vector<double>& y_mm, const LineRules& rules,
-                       std::vector<double>& times) {
-  const auto change = [&](std::size_t i, const std::vector<double>& at_mm) {
-    const auto speed = [&](std::size_t line) {
-      return (at_mm[line] - at_mm[line - 1]) / (times[line] - times[line - 1]);
-    };
-    return speed(i + 1) - speed(i);
+bool split_quick_joins(const BaseTrajectory& base, const Axes<AxisVertices>& vertices,
+                       const LineRules& rules, std::vector<double>& times) {
+  const auto change_mm_s = [&](std::size_t i) {
+    return map_axes(
+        [&](const AxisVertices& axis) {
+          const std::vector<double>& at_mm = axis.position_mm;
+          const auto speed = [&](std::size_t line) {
+            return (at_mm[line] - at_mm[line - 1]) / (times[line] - times[line - 1]);
+          };
+          return speed(i + 1) - speed(i);
+        },
+        vertices);
   };
   const auto join = [&](std::size_t i) {
     return i > 0 && i + 1 < times.size() &&
-           rules.motors.largest_of_xy(change(i, x_mm), change(i, y_mm), 0.0) >
-               rules.max_speed_step_mm_s;
+           rules.motors.largest_of_xy(change_mm_s(i)) > rules.max_speed_step_mm_s;
   };
   // Halves of one length change their speed least.
   return halve(base, rules, false, times, [&](std::size_t i) { return join(i) || join(i - 1); });

@@ -5,6 +5,7 @@
 
 #include "unflex/dynamics/base_trajectory.hpp"
 #include "unflex/emit/line_rules.hpp"
+#include "vertices.hpp"
 
 namespace unflex::emit {
 
@@ -27,19 +28,16 @@ void append_line_ends(const dynamics::BaseTrajectory& base, double from, double 
                       const LineRules& rules, std::vector<double>& times);
 
 // If the nozzle is further off at the end of a line than lines within the tolerance should cause,
-// halves that line and the line before it. x_error_mm and y_error_mm are the nozzle's errors at
-// `times`. A line stays whole if its halves would be too short. Returns whether any line was
-// halved.
-bool split_lines(const dynamics::BaseTrajectory& base, const std::vector<double>& x_error_mm,
-                 const std::vector<double>& y_error_mm, const LineRules& rules,
-                 std::vector<double>& times);
+// halves that line and the line before it. The vertices are those at `times`. A line stays whole if
+// its halves would be too short. Returns whether any line was halved.
+bool split_lines(const dynamics::BaseTrajectory& base, const Axes<AxisVertices>& vertices,
+                 const LineRules& rules, std::vector<double>& times);
 
-// Halves both lines of each join at which the speed of an axis changes by more than it may. x_mm
-// and y_mm are the vertices at `times`. A line stays whole if its halves would be too short.
-// Returns whether any line was halved.
-bool split_quick_joins(const dynamics::BaseTrajectory& base, const std::vector<double>& x_mm,
-                       const std::vector<double>& y_mm, const LineRules& rules,
-                       std::vector<double>& times);
+// Halves both lines of each join at which the speed of an axis changes by more than it may. The
+// vertices are those at `times`. A line stays whole if its halves would be too short. Returns
+// whether any line was halved.
+bool split_quick_joins(const dynamics::BaseTrajectory& base, const Axes<AxisVertices>& vertices,
+                       const LineRules& rules, std::vector<double>& times);
 
 // Halves both lines of each of these joins, the i-th being behind line i. A line stays whole if its
 // halves would be too short. Returns whether any line was halved.

@@ -10,8 +10,6 @@ namespace unflex::emit {
 namespace {
 
 using gcode::E;
-using gcode::X;
-using gcode::Y;
 using planner::PlannedMove;
 
 // The nozzle is looked for this far along the path on both sides of the reference.
@@ -23,8 +21,7 @@ constexpr double kTowardsReference = 0.01;
 }  // namespace
 
 NozzleProgress::NozzleProgress(const Run& run, const std::vector<double>& starts_s,
-                               const dynamics::FlexibleAxis& nozzle_x,
-                               const dynamics::FlexibleAxis& nozzle_y)
+                               const Axes<dynamics::FlexibleAxis>& nozzle)
     : moves_(run.moves), period_s_(run.base->period_s) {
   path_mm_.push_back(0.0);
   filament_mm_.push_back(0.0);
@@ -60,23 +57,19 @@ NozzleProgress::NozzleProgress(const Run& run, const std::vector<double>& starts
   flow_end_mm_s_ = run.until_s ? flow_mm_s(*run.until_s) : 0.0;
   // A run begins at rest. A part of a run begins in motion, and we take the nozzle to be on the
   // reference then.
-  const dynamics::AxisMotion x = run.base->x_at(0.0);
-  const dynamics::AxisMotion y = run.base->y_at(0.0);
-  dynamics::NozzleXY state{nozzle_x.riding(x.position_mm, x.velocity_mm_s),
-                           nozzle_y.riding(y.position_mm, y.velocity_mm_s)};
+  dynamics::NozzleXY state =
+      riding(nozzle, run.base->position_mm(0.0), run.base->velocity_mm_s(0.0));
   if (run.goes_on) {
     const std::size_t first = static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(
         std::upper_bound(starts_s.begin(), starts_s.end(), 0.0) - starts_s.begin() - 1, 0,
         static_cast<std::ptrdiff_t>(moves_->size()) - 1));
     const PlannedMove& move = (*moves_)[first];
     const double local_s = std::clamp(-starts_s[first], 0.0, move.duration_s());
-    const gcode::Position at = move.position_mm(local_s);
-    const double v = move.velocity_mm_s(local_s);
-    state = {nozzle_x.riding(at[X], v * move.direction[X]),
-             nozzle_y.riding(at[Y], v * move.direction[Y])};
+    state = riding(nozzle, xy_of(move.position_mm(local_s)),
+                   move.velocity_mm_s(local_s) * xy_of(move.direction));
   }
-  const Followed along_x(*run.base, &dynamics::BaseTrajectory::x, nozzle_x, state.x);
-  const Followed along_y(*run.base, &dynamics::BaseTrajectory::y, nozzle_y, state.y);
+  const Followed x(*run.base, 0, nozzle.x, state.x);
+  const Followed y(*run.base, 1, nozzle.y, state.y);
   double furthest = 0.0;
   for (std::size_t k = 0; k < run.base->nodes(); ++k) {
     const double t = period_s_ * static_cast<double>(k);
@@ -86,14 +79,12 @@ NozzleProgress::NozzleProgress(const Run& run, const std::vector<double>& starts
       continue;
     }
     const double at_mm = reference_mm(t);
-    furthest = std::max(furthest,
-                        nearest_mm(along_x.at(t).position(), along_y.at(t).position(), i, at_mm));
+    furthest = std::max(furthest, nearest_mm({x.at(t).position(), y.at(t).position()}, i, at_mm));
     progress_mm_.push_back(furthest);
   }
 }
 
-double NozzleProgress::nearest_mm(double x_mm, double y_mm, std::size_t move,
-                                  double reference_mm) const {
+double NozzleProgress::nearest_mm(const XY& p_mm, std::size_t move, double reference_mm) const {
   double best = std::numeric_limits<double>::infinity();
   double nearest = reference_mm;
   const auto look_at = [&](std::size_t i) {
@@ -102,16 +93,13 @@ double NozzleProgress::nearest_mm(double x_mm, double y_mm, std::size_t move,
     if (length <= 0.0) {
       return;
     }
-    const double dx = segment.delta(X) / length;
-    const double dy = segment.delta(Y) / length;
-    const double px = x_mm - segment.start_mm[X];
-    const double py = y_mm - segment.start_mm[Y];
+    const XY direction = segment.way_xy_mm() / length;
+    const XY from_start_mm = p_mm - xy_of(segment.start_mm);
     const double ahead = reference_mm - path_mm_[i];
     const double along = std::clamp(
-        (px * dx + py * dy + kTowardsReference * ahead) / (1.0 + kTowardsReference), 0.0, length);
-    const double across_x = px - along * dx;
-    const double across_y = py - along * dy;
-    const double cost = across_x * across_x + across_y * across_y +
+        (dot(from_start_mm, direction) + kTowardsReference * ahead) / (1.0 + kTowardsReference),
+        0.0, length);
+    const double cost = squared(from_start_mm - along * direction) +
                         kTowardsReference * (along - ahead) * (along - ahead);
     if (cost < best) {
       best = cost;

@@ -19,7 +19,7 @@ class NozzleProgress {
   // The nozzle hangs on the run's base. starts_s: when each move starts, and when the last one
   // ends.
   NozzleProgress(const Run& run, const std::vector<double>& starts_s,
-                 const dynamics::FlexibleAxis& nozzle_x, const dynamics::FlexibleAxis& nozzle_y);
+                 const Axes<dynamics::FlexibleAxis>& nozzle);
 
   // Q(s_n(t)), mm, from 0 on. As the nozzle never goes back, it is monotone where Q is.
   [[nodiscard]] double filament_mm(double t) const;
@@ -39,9 +39,8 @@ class NozzleProgress {
   [[nodiscard]] bool past_first_move(double t) const;
 
  private:
-  // s_n of a nozzle at (x_mm, y_mm), while the reference is on `move` and s = reference_mm.
-  [[nodiscard]] double nearest_mm(double x_mm, double y_mm, std::size_t move,
-                                  double reference_mm) const;
+  // s_n of a nozzle at p, while the reference is on `move` and s = reference_mm.
+  [[nodiscard]] double nearest_mm(const XY& p_mm, std::size_t move, double reference_mm) const;
   [[nodiscard]] double progress_mm(double t) const;
   // What has come by t of a quantity that is known where moves begin and end.
   [[nodiscard]] double along(const std::vector<double>& at_moves, double t) const;

@@ -30,8 +30,6 @@ namespace unflex::emit {
 namespace {
 
 using gcode::E;
-using gcode::X;
-using gcode::Y;
 using gcode::Z;
 
 // The ramps are short against the lines, so a few rounds over the neighbours settle them.
@@ -50,22 +48,20 @@ constexpr double kMostCorrection = 2.0;
 constexpr double kPassing_s = 0.05;
 constexpr std::size_t kNoStroke = std::numeric_limits<std::size_t>::max();
 
-double magnitude(const std::optional<std::array<double, 2>>& velocity_mm_s) {
-  return velocity_mm_s ? math::hypot((*velocity_mm_s)[0], (*velocity_mm_s)[1]) : 0.0;
+double magnitude(const std::optional<XY>& velocity_mm_s) {
+  return velocity_mm_s ? length(*velocity_mm_s) : 0.0;
 }
 
 // The line that leads to `next` (side = −1) or away from it (side = 1), with that velocity and as
 // much filament per mm as `next`.
-gcode::Segment passing_line(const gcode::Segment& next, const std::array<double, 2>& velocity_mm_s,
-                            double side) {
+gcode::Segment passing_line(const gcode::Segment& next, const XY& velocity_mm_s, double side) {
   gcode::Segment line;
   gcode::Position& near = side < 0.0 ? line.end_mm : line.start_mm;
   gcode::Position& far = side < 0.0 ? line.start_mm : line.end_mm;
   near = side < 0.0 ? next.start_mm : next.end_mm;
   far = near;
-  far[X] += side * kPassing_s * velocity_mm_s[0];
-  far[Y] += side * kPassing_s * velocity_mm_s[1];
-  line.feed_mm_s = math::hypot(velocity_mm_s[0], velocity_mm_s[1]);
+  set_xy(far, xy_of(far) + side * kPassing_s * velocity_mm_s);
+  line.feed_mm_s = length(velocity_mm_s);
   if (next.length_xy_mm() > 0.0) {
     far[E] += side * kPassing_s * line.feed_mm_s * next.delta(E) / next.length_xy_mm();
   }
@@ -212,7 +208,7 @@ class SpeedSolver {
     for (std::size_t i = 0; i < strokes.size(); ++i) {
       const Stroke& stroke = strokes[i];
       const double dz = stroke.z_mm - at[Z];
-      distance_mm_[i] = math::hypot(stroke.x_mm - at[X], stroke.y_mm - at[Y], dz);
+      distance_mm_[i] = math::hypot(distance(xy_of(at), stroke.place_mm), dz);
       if (dz != 0.0) {
         accel_mm_s2_[i] = std::min(accel_mm_s2_[i], z_accel_mm_s2 * distance_mm_[i] / std::abs(dz));
       }
@@ -221,7 +217,7 @@ class SpeedSolver {
         accel_mm_s2_[i] = std::min(
             accel_mm_s2_[i], drawing_back_mm_s2(options.fixed) * distance_mm_[i] / std::abs(de));
       }
-      const gcode::Position to = {stroke.x_mm, stroke.y_mm, stroke.z_mm, stroke.e_mm};
+      const gcode::Position to = stroke.end_mm();
       for (std::size_t axis = 0;
            spec_of(options.fixed.firmware).motion.counts_step_events && axis < to.size(); ++axis) {
         const double steps_per_mm = options.fixed.steps_per_mm[axis];
@@ -300,8 +296,8 @@ class SpeedSolver {
       if (i > 0) {
         clock.change_last(speed_mm_s_[i - 1]);  // which may depend on this one
       }
-      const gcode::Position to = {stroke.x_mm, stroke.y_mm, stroke.z_mm,
-                                  start_mm_[gcode::E] + stroke.e_mm};
+      gcode::Position to = stroke.end_mm();
+      to[E] = start_mm_[E] + stroke.e_mm;
       line = {line.end_mm, to, stroke.speed_mm_s, i, true};
       if (zeroes_e_) {
         line.reading_of_e = reading.until(stroke.e_mm);

@@ -11,8 +11,8 @@ namespace unflex::emit {
 
 // The base's velocity where the lines begin and end; unset: it rests.
 struct Passing {
-  std::optional<std::array<double, 2>> in_mm_s;
-  std::optional<std::array<double, 2>> out_mm_s;
+  std::optional<XY> in_mm_s;
+  std::optional<XY> out_mm_s;
   // The motion before a run, if the machine does not stop between the two.
   std::optional<gcode::Segment> kept_before = {};
 };

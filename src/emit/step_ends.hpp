@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <cstdlib>
 
+#include "line_cost.hpp"
 #include "vertices.hpp"
 
 namespace unflex::emit {
@@ -28,8 +29,9 @@ using Place = std::array<std::int64_t, 2>;  // in steps
 
 class StepGrid {
  public:
-  StepGrid(const AxisGrid& x, const AxisGrid& y)
-      : step_mm_(x.step_mm, y.step_mm), offset_mm_(x.offset_mm, y.offset_mm) {}
+  explicit StepGrid(const Axes<AxisGrid>& grid)
+      : step_mm_(of_axes(grid, &AxisGrid::step_mm)),
+        offset_mm_(of_axes(grid, &AxisGrid::offset_mm)) {}
 
   [[nodiscard]] const Eigen::Vector2d& step_mm() const { return step_mm_; }
   [[nodiscard]] Eigen::Vector2d steps(const Eigen::Vector2d& mm) const {

@@ -16,9 +16,11 @@ template <int kModes>
 State<kModes> start_of(const RunEnds& ends, const LineCosts<kModes>& costs, const StepGrid& grid,
                        const LineRules& rules) {
   State<kModes> state;
-  state.at = grid.nearest({ends.start_x_mm, ends.start_y_mm});
-  state.z[place_of_o<kModes>(0)] = ends.start_x_mm - costs.base_mm(0)[0];
-  state.z[place_of_o<kModes>(1)] = ends.start_y_mm - costs.base_mm(0)[1];
+  state.at = grid.nearest(vector(ends.start_mm));
+  for (std::size_t axis = 0; axis < XY::kCount; ++axis) {
+    state.z[place_of_o<kModes>(axis)] =
+        ends.start_mm[axis] - costs.base_mm(0)[static_cast<Eigen::Index>(axis)];
+  }
   if (ends.goes_on) {
     state.speed_mm_s = (costs.base_mm(1) - costs.base_mm(0)) / costs.dt_s();
     state.line_s = rules.even_line_s();
@@ -56,10 +58,19 @@ State<kModes> end_of(const Leap& leap, const LineCosts<kModes>& costs, const Ste
   return state;
 }
 
+Polygon single_place(double time_s, const Eigen::Vector2d& place_mm) {
+  Polygon polygon{{time_s}, {}};
+  polygon.add(xy_of(place_mm));
+  return polygon;
+}
+
 void append(const Polygon& part, Polygon& all) {
   all.times_s.insert(all.times_s.end(), part.times_s.begin(), part.times_s.end());
-  all.x_mm.insert(all.x_mm.end(), part.x_mm.begin(), part.x_mm.end());
-  all.y_mm.insert(all.y_mm.end(), part.y_mm.begin(), part.y_mm.end());
+  for_each_axis(
+      [](std::vector<double>& all_mm, const std::vector<double>& part_mm) {
+        all_mm.insert(all_mm.end(), part_mm.begin(), part_mm.end());
+      },
+      all.places_mm, part.places_mm);
 }
 
 // The mean over the nozzles of J along these lines.
@@ -76,12 +87,11 @@ double cost_of(const Polygon& polygon, const LineCosts<kModes>& costs, const Sta
   for (std::size_t i = 1; i < polygon.times_s.size(); ++i) {
     const std::size_t k = candidate(i - 1);
     const std::size_t m = candidate(i) - k;
-    const Eigen::Vector2d way(polygon.x_mm[i] - polygon.x_mm[i - 1],
-                              polygon.y_mm[i] - polygon.y_mm[i - 1]);
+    const Eigen::Vector2d to = vector(polygon.place_mm(i));
+    const Eigen::Vector2d way = to - vector(polygon.place_mm(i - 1));
     if (m > longest) {
       // A leap, at whose end the nozzle goes along with the line.
       const double duration_s = costs.dt_s() * static_cast<double>(m);
-      const Eigen::Vector2d to(polygon.x_mm[i], polygon.y_mm[i]);
       z = going_along<kModes>(costs, to - costs.base_mm(k + m),
                               (way - (costs.base_mm(k + m) - costs.base_mm(k))) / duration_s);
       continue;
@@ -98,9 +108,9 @@ double cost_of(const Polygon& polygon, const LineCosts<kModes>& costs, const Sta
 template <int kModes>
 Polygon path_of(const dynamics::BaseTrajectory& base, const std::vector<double>& wanted,
                 const std::function<ErrorWeight(double)>& weight, const RunEnds& ends,
-                const AxisGrid& x, const AxisGrid& y, const LineRules& rules) {
+                const Axes<AxisGrid>& axes, const LineRules& rules) {
   const LineCosts<kModes> costs(base, weight, rules);
-  const StepGrid grid(x, y);
+  const StepGrid grid(axes);
   const auto candidate = [&](double t) {
     return std::min(static_cast<std::size_t>(nearest_whole(t / costs.dt_s())), costs.size() - 1);
   };
@@ -109,15 +119,13 @@ Polygon path_of(const dynamics::BaseTrajectory& base, const std::vector<double>&
   for (const double t : wanted) {
     wanted_at.push_back(candidate(t));
   }
-  const Place end = grid.nearest({ends.end_x_mm, ends.end_y_mm});
+  const Place end = grid.nearest(vector(ends.end_mm));
   Polygon all;
   std::vector<double> lines_before_s = ends.lines_before_s;
   const auto go_on = [&](const Stretch<kModes>& stretch) {
     // A leap may begin or end where the run does.
     const Polygon part = stretch.begin.k == stretch.last
-                             ? Polygon{{costs.time_s(stretch.last)},
-                                       {grid.mm(stretch.end)[0]},
-                                       {grid.mm(stretch.end)[1]}}
+                             ? single_place(costs.time_s(stretch.last), grid.mm(stretch.end))
                              : search(costs, wanted_at, stretch, grid, rules, lines_before_s);
     append(part, all);
     lines_before_s = all.times_s;
@@ -142,7 +150,7 @@ Polygon path_of(const dynamics::BaseTrajectory& base, const std::vector<double>&
       if (2.0 * cost > kMuch_mm * kMuch_mm * all.times_s.back()) {
         LineRules exact = rules;
         exact.freq_error = 0.0;
-        Polygon other = path_of<kModes / 2>(base, wanted, weight, ends, x, y, exact);
+        Polygon other = path_of<kModes / 2>(base, wanted, weight, ends, axes, exact);
         if (!other.times_s.empty() && cost_of(other, costs, start, rules) < cost) {
           return other;
         }
@@ -156,12 +164,13 @@ Polygon path_of(const dynamics::BaseTrajectory& base, const std::vector<double>&
 
 Polygon step_path(const dynamics::BaseTrajectory& base, const std::vector<double>& wanted,
                   const std::function<ErrorWeight(double)>& weight, const RunEnds& ends,
-                  const AxisGrid& x, const AxisGrid& y, const LineRules& rules) {
-  const std::size_t modes = std::max(rules.nozzle_x.mode_count(), rules.nozzle_y.mode_count());
+                  const Axes<AxisGrid>& grid, const LineRules& rules) {
+  const std::size_t modes = most_of_axes(
+      [](const dynamics::FlexibleAxis& axis) { return axis.mode_count(); }, rules.nozzle);
   return with_modes(modes, [&](auto count) {
     constexpr int kModes = decltype(count)::value;
-    return nozzles_for(rules) == 1 ? path_of<kModes>(base, wanted, weight, ends, x, y, rules)
-                                   : path_of<2 * kModes>(base, wanted, weight, ends, x, y, rules);
+    return nozzles_for(rules) == 1 ? path_of<kModes>(base, wanted, weight, ends, grid, rules)
+                                   : path_of<2 * kModes>(base, wanted, weight, ends, grid, rules);
   });
 }
 

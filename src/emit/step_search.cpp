@@ -126,9 +126,7 @@ class Search {
             begins_s_.push_back(costs_->time_s(state->k));
           }
           polygon_.times_s.push_back(costs_->time_s(state->k));
-          const Eigen::Vector2d at = grid_.mm(state->at);
-          polygon_.x_mm.push_back(at[0]);
-          polygon_.y_mm.push_back(at[1]);
+          polygon_.add(xy_of(grid_.mm(state->at)));
         }
       }
       if (is_last) {
@@ -281,8 +279,7 @@ class Search {
 
   [[nodiscard]] double too_quick(const Eigen::Vector2d& change_mm_s, double both_s) const {
     const double allowed = rules_->max_accel_mm_s2 * 0.5 * both_s;
-    const double excess =
-        rules_->motors.largest_of_xy(change_mm_s[0], change_mm_s[1], 0.0) / allowed - 1.0;
+    const double excess = rules_->motors.largest_of_xy(xy_of(change_mm_s)) / allowed - 1.0;
     return excess > 0.0 ? kTooQuick * (1.0 + excess) : 0.0;
   }
 
@@ -365,8 +362,8 @@ class Search {
     // base.
     const Eigen::Vector2d& base = costs_->base_mm(k);
     const Eigen::Vector2d& slack = grid_.step_mm();
-    const Eigen::Vector2d least_mm(rules_->reach_x.min_mm, rules_->reach_y.min_mm);
-    const Eigen::Vector2d most_mm(rules_->reach_x.max_mm, rules_->reach_y.max_mm);
+    const Eigen::Vector2d least_mm = of_axes(rules_->reach, &Reach::min_mm);
+    const Eigen::Vector2d most_mm = of_axes(rules_->reach, &Reach::max_mm);
     Places places{.min_steps = rules_->min_steps,
                   .least = grid_.steps(least_mm.cwiseMin(base - slack)),
                   .most = grid_.steps(most_mm.cwiseMax(base + slack))};

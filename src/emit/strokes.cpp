@@ -19,8 +19,6 @@
 namespace unflex::emit {
 namespace {
 
-using gcode::X;
-using gcode::Y;
 using gcode::Z;
 
 // On a grid this coarse, rounding is what limits accuracy.
@@ -84,8 +82,10 @@ bool skips_last_move(const Run& run, const Grid& grid) {
   constexpr double kRounding = 1.25;  // steps
   const gcode::Position end = end_of_moves(run);
   const gcode::Position& machine = run.moves->back().segment.end_mm;
-  return !run.until_s && (std::abs(end[X] - machine[X]) > kRounding * grid.x.step_mm ||
-                          std::abs(end[Y] - machine[Y]) > kRounding * grid.y.step_mm);
+  return !run.until_s &&
+         any_axis([](double way_mm,
+                     const AxisGrid& axis) { return std::abs(way_mm) > kRounding * axis.step_mm; },
+                  xy_of(end) - xy_of(machine), grid);
 }
 
 // Where the run's lines take the machine.
@@ -93,8 +93,7 @@ gcode::Position end_of_lines(const Run& run, const Timetable& table, const Grid&
   gcode::Position end =
       skips_last_move(run, grid) ? run.moves->back().segment.end_mm : end_of_moves(run);
   if (run.until_s) {
-    end[X] = grid.x.nearest(run.base->x_at(*run.until_s).position_mm);
-    end[Y] = grid.y.nearest(run.base->y_at(*run.until_s).position_mm);
+    set_xy(end, nearest(grid, run.base->position_mm(*run.until_s)));
     end[Z] = grid.z.nearest(table.height_mm(*run.until_s));
   }
   return end;
@@ -113,30 +112,26 @@ gcode::Position start_of(const Run& run) {
 
 gcode::Position start_position(const Run& run, const Grid& grid) {
   gcode::Position start = run.moves->front().segment.start_mm;
-  start[X] = start_of_lines(run, grid)[0];
-  start[Y] = start_of_lines(run, grid)[1];
+  set_xy(start, start_of_lines(run, grid));
   return start;
 }
 
 // Whether the line is long enough for the firmware to move at once, and not only with the next
 // line.
 bool goes_through(const Stroke& from, const Stroke& to, const Grid& grid, const LineRules& rules) {
-  const double steps = std::max(std::abs(to.x_mm - from.x_mm) / grid.x.step_mm,
-                                std::abs(to.y_mm - from.y_mm) / grid.y.step_mm);
+  const double steps = most_of_axes(
+      [](double way_mm, const AxisGrid& axis) { return std::abs(way_mm) / axis.step_mm; },
+      to.place_mm - from.place_mm, grid);
   return steps > rules.min_steps - 0.5;
 }
 
-using VelocityXY = std::array<double, 2>;
-
-VelocityXY velocity_mm_s(const Stroke& from, const Stroke& to) {
-  const double duration_s = to.end_s - from.end_s;
-  return {(to.x_mm - from.x_mm) / duration_s, (to.y_mm - from.y_mm) / duration_s};
+XY velocity_mm_s(const Stroke& from, const Stroke& to) {
+  return (to.place_mm - from.place_mm) / (to.end_s - from.end_s);
 }
 
 // Whether a motor would change its speed by more than it may.
-bool turns_quickly(const VelocityXY& before, const VelocityXY& after, const LineRules& rules) {
-  return rules.motors.largest_of_xy(after[0] - before[0], after[1] - before[1], 0.0) >
-         rules.max_speed_step_mm_s;
+bool turns_quickly(const XY& before, const XY& after, const LineRules& rules) {
+  return rules.motors.largest_of_xy(after - before) > rules.max_speed_step_mm_s;
 }
 
 // Whether t is near a sharp corner, or near the end of the run, beyond which the path does not go
@@ -169,8 +164,7 @@ ErrorWeight error_weight(const Run& run, const Timetable& table, double t) {
     return {kBehindEnd, 0.0, kBehindEnd};
   }
   const double length = segment.length_xy_mm();
-  const double nx = -segment.delta(Y) / length;
-  const double ny = segment.delta(X) / length;
+  const auto [nx, ny] = turned_left(segment.way_xy_mm()) / length;
   const double along = is_at_corner(run, table, move, t) ? kAlongAtCorner : kAlong;
   const double across = 1.0 - along;
   return {along + across * nx * nx, across * nx * ny, along + across * ny * ny};
@@ -178,56 +172,51 @@ ErrorWeight error_weight(const Run& run, const Timetable& table, double t) {
 
 // The largest changes of speed of each axis. If motors move both axes, each axis gets what the base
 // itself needs where lines join, and half of what is left to the motors.
-std::pair<SpeedSteps, SpeedSteps> speed_steps(const dynamics::BaseTrajectory& base,
-                                              const std::vector<double>& times, const Ends& ends,
-                                              const LineRules& rules) {
+Axes<SpeedSteps> speed_steps(const dynamics::BaseTrajectory& base, const std::vector<double>& times,
+                             const Ends& ends, const LineRules& rules) {
   const double most_mm_s = kOfSpeedStep * rules.max_speed_step_mm_s;
-  SpeedSteps x{most_mm_s, rules.max_accel_mm_s2};
-  SpeedSteps y = x;
+  Axes<SpeedSteps> steps = on_all_axes(SpeedSteps{most_mm_s, rules.max_accel_mm_s2});
   if (!rules.motors.shared_by_xy()) {
-    return {x, y};
+    return steps;
   }
-  const auto velocity = [&](double t, bool rests) {
-    return rests ? VelocityXY{}
-                 : VelocityXY{base.x_at(t).velocity_mm_s, base.y_at(t).velocity_mm_s};
-  };
-  VelocityXY before = velocity(0.0, ends.from_rest);
+  const auto velocity = [&](double t, bool rests) { return rests ? XY{} : base.velocity_mm_s(t); };
+  XY before = velocity(0.0, ends.from_rest);
   double before_s = 0.0;
-  const auto add_join = [&](const VelocityXY& after, double after_s) {
-    const double of_x = std::abs(after[0] - before[0]);
-    const double of_y = std::abs(after[1] - before[1]);
+  const auto add_join = [&](const XY& after, double after_s) {
+    const XY change_mm_s = map_axes([](double change) { return std::abs(change); }, after - before);
     const double both = std::min(most_mm_s, rules.max_accel_mm_s2 * 0.5 * (before_s + after_s));
     // Motors do x + y or x − y, whatever the signs of the two changes.
-    const double of_motors = std::max(rules.motors.largest_of_xy(of_x, of_y, 0.0),
-                                      rules.motors.largest_of_xy(of_x, -of_y, 0.0));
+    const double of_motors = std::max(rules.motors.largest_of_xy(change_mm_s),
+                                      rules.motors.largest_of_xy({change_mm_s.x, -change_mm_s.y}));
     const double left = std::max(both - of_motors, 0.0);
-    x.at_mm_s.push_back(of_x + 0.5 * left);
-    y.at_mm_s.push_back(of_y + 0.5 * left);
+    for_each_axis(
+        [&](SpeedSteps& axis, double change) { axis.at_mm_s.push_back(change + 0.5 * left); },
+        steps, change_mm_s);
     before = after;
     before_s = after_s;
   };
   for (std::size_t k = 0; k + 1 < times.size(); ++k) {
     const double duration_s = times[k + 1] - times[k];
-    add_join({(base.x_at(times[k + 1]).position_mm - base.x_at(times[k]).position_mm) / duration_s,
-              (base.y_at(times[k + 1]).position_mm - base.y_at(times[k]).position_mm) / duration_s},
+    add_join((base.position_mm(times[k + 1]) - base.position_mm(times[k])) / duration_s,
              duration_s);
   }
   add_join(velocity(times.back(), ends.to_rest), 0.0);
-  return {x, y};
+  return steps;
 }
 
 // Halves lines where the filament cannot change its speed as fast as the hotend asks. Returns
 // whether any line was halved.
 bool split_for_filament(const Run& run, const NozzleProgress& nozzle,
-                        const std::vector<double>& x_mm, const std::vector<double>& y_mm,
-                        const LineRules& rules, const EmitOptions& options,
-                        std::vector<double>& times) {
+                        const Axes<AxisVertices>& vertices, const LineRules& rules,
+                        const EmitOptions& options, std::vector<double>& times) {
   if (!writes_pressure(nozzle, options)) {
     return false;
   }
   LinesInTime lines{times, {}};
   for (std::size_t i = 1; i < times.size(); ++i) {
-    lines.lengths_mm.push_back(math::hypot(x_mm[i] - x_mm[i - 1], y_mm[i] - y_mm[i - 1]));
+    lines.lengths_mm.push_back(length(map_axes(
+        [&](const AxisVertices& axis) { return axis.position_mm[i] - axis.position_mm[i - 1]; },
+        vertices)));
   }
   return split_at_joins(*run.base, joins_at_limit(nozzle, lines, options), rules, times);
 }
@@ -236,63 +225,58 @@ Polygon polygon(const Run& run, const Timetable& table, const NozzleProgress& no
                 const std::vector<double>& wanted, const Grid& grid, const LineRules& rules,
                 const EmitOptions& options) {
   const dynamics::BaseTrajectory& base = *run.base;
-  if (grid.x.step_mm > kCoarse_mm || grid.y.step_mm > kCoarse_mm) {
-    const std::array<double, 2> start = start_of_lines(run, grid);
-    const gcode::Position end = end_of_lines(run, table, grid);
+  if (any_axis([](const AxisGrid& axis) { return axis.step_mm > kCoarse_mm; }, grid)) {
     return step_path(
         base, wanted, [&](double t) { return error_weight(run, table, t); },
-        {start[0], start[1], end[X], end[Y], run.lines_before_s, run.lines_after, run.goes_on,
-         run.until_s},
-        grid.x, grid.y, rules);
+        {start_of_lines(run, grid), xy_of(end_of_lines(run, table, grid)), run.lines_before_s,
+         run.lines_after, run.goes_on, run.until_s},
+        grid, rules);
   }
   const std::vector<double> required = required_times(run, wanted, rules);
   std::vector<double> times = {0.0};
   for (std::size_t i = 1; i < required.size(); ++i) {
     append_line_ends(base, required[i - 1], required[i], rules, times);
   }
-  const VertexChooser along_x(base, &dynamics::BaseTrajectory::x, rules.nozzle_x);
-  const VertexChooser along_y(base, &dynamics::BaseTrajectory::y, rules.nozzle_y);
+  const VertexChooser x(base, 0, rules.nozzle.x);
+  const VertexChooser y(base, 1, rules.nozzle.y);
+  const Axes<const VertexChooser*> choosers{&x, &y};
   const auto choose = [&] {
     const Ends ends{!run.goes_on, !run.until_s};
-    const auto [of_x, of_y] = speed_steps(base, times, ends, rules);
-    return std::pair{along_x.choose(times, grid.x, rules.reach_x, of_x, ends),
-                     along_y.choose(times, grid.y, rules.reach_y, of_y, ends)};
+    return map_axes(
+        [&](const VertexChooser* chooser, const AxisGrid& axis, const Reach& reach,
+            const SpeedSteps& steps) { return chooser->choose(times, axis, reach, steps, ends); },
+        choosers, grid, rules.reach, speed_steps(base, times, ends, rules));
   };
-  auto vertices = choose();
-  while (split_lines(base, vertices.first.nozzle_error_mm, vertices.second.nozzle_error_mm, rules,
-                     times) ||
-         split_quick_joins(base, vertices.first.position_mm, vertices.second.position_mm, rules,
-                           times) ||
-         split_for_filament(run, nozzle, vertices.first.position_mm, vertices.second.position_mm,
-                            rules, options, times)) {
+  Axes<AxisVertices> vertices = choose();
+  while (split_lines(base, vertices, rules, times) ||
+         split_quick_joins(base, vertices, rules, times) ||
+         split_for_filament(run, nozzle, vertices, rules, options, times)) {
     vertices = choose();
   }
-  return {std::move(times), std::move(vertices.first.position_mm),
-          std::move(vertices.second.position_mm)};
+  return {std::move(times),
+          map_axes([](const AxisVertices& axis) { return axis.position_mm; }, vertices)};
 }
 
 // How much of its change of Z a line can take. The line must not become steep, nor slow: Z has
 // limits of its own, which a run leaves as they are. The rest waits for other lines, as long as it
 // is too small to be seen. `before` and `after` are the velocities of the neighbouring lines.
-double change_of_z_mm(const Stroke& from, const Stroke& to, const VelocityXY& before,
-                      const VelocityXY& after, const Grid& grid, const EmitOptions& options) {
+double change_of_z_mm(const Stroke& from, const Stroke& to, const XY& before, const XY& after,
+                      const Grid& grid, const EmitOptions& options) {
   constexpr double kUnseen_mm = 0.01;
   // Share of the line's time that ramps may take. F makes up for them, so F changes more than the
   // speed does.
   constexpr double kRamps = 0.03;
-  const double length = math::hypot(to.x_mm - from.x_mm, to.y_mm - from.y_mm);
+  const double length_mm = distance(from.place_mm, to.place_mm);
   const double dz = to.z_mm - from.z_mm;
-  double most = 2.0 * gcode::kMaxSlope * length;
+  double most = 2.0 * gcode::kMaxSlope * length_mm;
   if (std::abs(dz) < kUnseen_mm) {
     const double duration_s = to.end_s - from.end_s;
-    const VelocityXY own = velocity_mm_s(from, to);
+    const XY own = velocity_mm_s(from, to);
     // Where the path bends, a line has to slow down as if it had a ramp.
-    const auto change_mm_s = [&](const VelocityXY& other) {
-      return math::hypot(own[0] - other[0], own[1] - other[1]);
-    };
+    const auto change_mm_s = [&](const XY& other) { return distance(other, own); };
     const ZLimits limits = z_limits(options.fixed, options.run_limits);
     most = std::min({most, limits.speed_mm_s * duration_s,
-                     kRamps * limits.accel_mm_s2 * length * duration_s /
+                     kRamps * limits.accel_mm_s2 * length_mm * duration_s /
                          std::max(change_mm_s(before), change_mm_s(after))});
   }
   if (std::abs(dz) <= most) {
@@ -303,10 +287,10 @@ double change_of_z_mm(const Stroke& from, const Stroke& to, const VelocityXY& be
 
 // The run must end at its height. What the last line cannot take of the change of Z, the lines
 // before it take. `after`: the velocity behind the last line.
-void climb_in_time(const Stroke& start, VelocityXY after, const Grid& grid,
-                   const EmitOptions& options, std::vector<Stroke>& strokes) {
+void climb_in_time(const Stroke& start, XY after, const Grid& grid, const EmitOptions& options,
+                   std::vector<Stroke>& strokes) {
   for (std::size_t i = strokes.size(); i-- > 1;) {
-    const VelocityXY before = velocity_mm_s(i > 1 ? strokes[i - 2] : start, strokes[i - 1]);
+    const XY before = velocity_mm_s(i > 1 ? strokes[i - 2] : start, strokes[i - 1]);
     const double change_mm =
         change_of_z_mm(strokes[i - 1], strokes[i], before, after, grid, options);
     const double left_mm = strokes[i].z_mm - strokes[i - 1].z_mm - change_mm;
@@ -320,10 +304,10 @@ void climb_in_time(const Stroke& start, VelocityXY after, const Grid& grid,
 
 // The velocity with which a part of a run begins and ends.
 Passing passing(const Run& run) {
-  const auto velocity = [&](double t) -> std::optional<std::array<double, 2>> {
+  const auto velocity = [&](double t) {
     constexpr double kMoves_mm_s = 0.1;
-    const std::array v{run.base->x_at(t).velocity_mm_s, run.base->y_at(t).velocity_mm_s};
-    return math::hypot(v[0], v[1]) > kMoves_mm_s ? std::optional(v) : std::nullopt;
+    const XY v = run.base->velocity_mm_s(t);
+    return length(v) > kMoves_mm_s ? std::optional(v) : std::nullopt;
   };
   Passing result;
   result.kept_before = run.kept_before;
@@ -338,23 +322,19 @@ Passing passing(const Run& run) {
 
 }  // namespace
 
-std::array<double, 2> start_of_lines(const Run& run, const Grid& grid) {
+XY start_of_lines(const Run& run, const Grid& grid) {
   if (!run.goes_on) {
-    const gcode::Position& start = run.moves->front().segment.start_mm;
-    return {start[X], start[Y]};
+    return xy_of(run.moves->front().segment.start_mm);
   }
-  return run.from_mm.value_or(std::array{grid.x.nearest(run.base->x_at(0.0).position_mm),
-                                         grid.y.nearest(run.base->y_at(0.0).position_mm)});
+  return run.from_mm.value_or(nearest(grid, run.base->position_mm(0.0)));
 }
 
 void give_length(const Stroke& next, const Grid& grid, const LineRules& rules, Stroke& stroke) {
-  const double along_x = next.x_mm - stroke.x_mm;
-  const double along_y = next.y_mm - stroke.y_mm;
-  const bool along_its_y = std::abs(along_y) > std::abs(along_x);
-  const Reach& reach = along_its_y ? rules.reach_y : rules.reach_x;
-  double& at_mm = along_its_y ? stroke.y_mm : stroke.x_mm;
-  const double shift_mm = std::copysign(rules.min_steps * (along_its_y ? grid.y : grid.x).step_mm,
-                                        along_its_y ? along_y : along_x);
+  const XY way_mm = next.place_mm - stroke.place_mm;
+  const std::size_t axis = std::abs(way_mm.y) > std::abs(way_mm.x) ? 1 : 0;
+  const Reach& reach = rules.reach[axis];
+  double& at_mm = stroke.place_mm[axis];
+  const double shift_mm = std::copysign(rules.min_steps * grid[axis].step_mm, way_mm[axis]);
   const double ahead_mm = at_mm + shift_mm;
   const bool within = ahead_mm >= reach.min_mm && ahead_mm <= reach.max_mm;
   at_mm = within ? ahead_mm : at_mm - shift_mm;
@@ -367,7 +347,7 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
   rules.tolerance_mm *= run.tolerance_share;
   rules.burst_lines = static_cast<int>(run.limits_share * rules.burst_lines);
   rules.max_accel_mm_s2 *= run.limits_share;
-  const NozzleProgress nozzle(run, table.starts_s(), rules.nozzle_x, rules.nozzle_y);
+  const NozzleProgress nozzle(run, table.starts_s(), rules.nozzle);
   const Polygon vertices = polygon(
       run, table, nozzle, wanted_times(run, table, event_times_s, nozzle, options.has_free_timing),
       grid, rules, options);
@@ -382,17 +362,16 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
   const RunFilament filament{end[gcode::E] - file_start_e_mm, file_start_e_mm - start[gcode::E]};
   std::vector<double> ends_s;  // of the strokes
   std::size_t laying = 0;  // lines that lay the run's filament; lines of the tail come after them
-  Stroke last{0.0, start[X], start[Y], start[Z]};
+  Stroke last{0.0, xy_of(start), start[Z]};
   double dropped_s = times.front();
   std::size_t event = 0;
   const Passing ends = passing(run);
-  VelocityXY before = ends.in_mm_s.value_or(VelocityXY{});
+  XY before = ends.in_mm_s.value_or(XY{});
   for (std::size_t i = 1; i < times.size(); ++i) {
     Stroke stroke;
     stroke.end_s = times[i] - dropped_s;
     const bool is_end = i + 1 == times.size();
-    stroke.x_mm = is_end ? end[X] : vertices.x_mm[i];
-    stroke.y_mm = is_end ? end[Y] : vertices.y_mm[i];
+    stroke.place_mm = is_end ? xy_of(end) : vertices.place_mm(i);
     stroke.z_mm = is_end ? end[Z] : grid.z.nearest(table.height_mm(times[i]));
     // An event goes before the stroke that begins nearest to its moment.
     while (event < event_times_s.size() &&
@@ -401,7 +380,7 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
     }
     stroke.events = event;
     if (!is_end) {
-      const Stroke next{times[i + 1] - dropped_s, vertices.x_mm[i + 1], vertices.y_mm[i + 1]};
+      const Stroke next{times[i + 1] - dropped_s, vertices.place_mm(i + 1)};
       if (grid.x.step_mm <= kCoarse_mm && !result.empty() &&
           !goes_through(last, stroke, grid, rules) &&
           turns_quickly(before, velocity_mm_s(last, next), rules)) {
@@ -424,18 +403,16 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
   }
   if (!result.empty()) {
     Stroke& final = result.back();
-    final.x_mm = end[X];
-    final.y_mm = end[Y];
+    final.place_mm = xy_of(end);
     final.z_mm = end[Z];
-    climb_in_time({0.0, start[X], start[Y], start[Z]}, ends.out_mm_s.value_or(VelocityXY{}), grid,
-                  options, result);
+    climb_in_time({0.0, xy_of(start), start[Z]}, ends.out_mm_s.value_or(XY{}), grid, options,
+                  result);
     lay_filament(run, table, nozzle, filament, start, ends_s, laying, options, result);
     if (skips_last_move(run, grid)) {
       // The text ends where the file does, by a line that the firmware skips as well.
       const gcode::Position file_end = end_of_moves(run);
       Stroke rest = result.back();
-      rest.x_mm = file_end[X];
-      rest.y_mm = file_end[Y];
+      rest.place_mm = xy_of(file_end);
       rest.z_mm = file_end[Z];
       rest.e_mm = file_end[gcode::E] - file_start_e_mm;
       rest.is_skipped = true;

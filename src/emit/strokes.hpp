@@ -14,14 +14,15 @@ namespace unflex::emit {
 // One line to be: where the machine shall be at its end, and when.
 struct Stroke {
   double end_s = 0.0;  // since the start of the run
-  double x_mm = 0.0;
-  double y_mm = 0.0;
+  XY place_mm = {};
   double z_mm = 0.0;
   double e_mm = 0.0;        // filament since the start of the run
   double speed_mm_s = 0.0;  // after M220
   int feed_decimals = 0;    // digits F needs
   std::size_t events = 0;   // how many of the run's events stand before the stroke, in all
   bool is_skipped = false;  // the firmware leaves its way to the next move
+
+  [[nodiscard]] gcode::Position end_mm() const { return {place_mm.x, place_mm.y, z_mm, e_mm}; }
 };
 
 // Decimals of E in a line.
@@ -32,16 +33,14 @@ inline constexpr int kFilamentDecimals = 5;
 inline constexpr double kMostReadingOfE_mm = 64.0;
 
 // What a run is written in: places, and speeds as F before M220.
-struct Grid {
-  AxisGrid x;
-  AxisGrid y;
+struct Grid : Axes<AxisGrid> {
   AxisGrid z;
   double speed_factor = 1.0;  // M220 when the run begins
   bool zeroes_e = false;      // RunStart::zeroes_e
 };
 
 // The X and Y where the first line of the run begins.
-[[nodiscard]] std::array<double, 2> start_of_lines(const Run& run, const Grid& grid);
+[[nodiscard]] XY start_of_lines(const Run& run, const Grid& grid);
 
 // The strokes of a run. Positions lie on the grid, but a run's last one is exactly where the last
 // move ends. Where the firmware skips that move, so does the last stroke (is_skipped). A stroke

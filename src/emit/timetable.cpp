@@ -27,11 +27,12 @@ Timetable::Timetable(const Run& run) : run_(&run) {
   }
   starts_s_.push_back(t);
   const dynamics::BaseTrajectory& base = *run.base;
+  const auto place_mm = [&](std::size_t k) {
+    return map_axes([&](const auto& axis) { return axis.position_mm[k]; }, base);
+  };
   travelled_mm_.push_back(0.0);
   for (std::size_t k = 1; k < base.nodes(); ++k) {
-    travelled_mm_.push_back(travelled_mm_.back() +
-                            math::hypot(base.x.position_mm[k] - base.x.position_mm[k - 1],
-                                        base.y.position_mm[k] - base.y.position_mm[k - 1]));
+    travelled_mm_.push_back(travelled_mm_.back() + distance(place_mm(k - 1), place_mm(k)));
   }
 }
 
@@ -74,8 +75,7 @@ bool Timetable::filament_changes(std::size_t i) const {
     return false;  // nothing is drawn, so it does not matter where along a wipe it happens
   }
   const double t = starts_s_[i];
-  const double speed =
-      math::hypot(run_->base->x_at(t).velocity_mm_s, run_->base->y_at(t).velocity_mm_s);
+  const double speed = length(run_->base->velocity_mm_s(t));
   const double jump = std::abs(filament_per_mm(i) - filament_per_mm(i - 1));
   return jump * std::max(speed, 1.0) * kTypicalLineS / 4.0 > kFilamentStepMm;
 }

@@ -209,13 +209,13 @@ Shape<kModes> shape_of(const Steps<kModes>& step, int steps) {
 }
 
 template <int kModes>
-Stage<kModes> stage(const BaseTrajectory& base, BaseAxis axis, const Followed& followed,
+Stage<kModes> stage(const BaseTrajectory& base, std::size_t axis, const Followed& followed,
                     const Steps<kModes>& step, const Shape<kModes>& shape, double from, double to) {
   constexpr int kY = kOfY<kModes>;
   const double duration = to - from;
   const std::size_t steps = shape.of_nozzle.size();
-  const double b0 = base.at(base.*axis, from).position_mm;
-  const double slope = (base.at(base.*axis, to).position_mm - b0) / duration;
+  const double b0 = base.at(base[axis], from).position_mm;
+  const double slope = (base.at(base[axis], to).position_mm - b0) / duration;
   Stage<kModes> result;
   // The nozzle's answer to the chord alone, and how far that is from the nozzle that follows b.
   Vector<kY> chord = vector_of<kModes>(followed.at(from)) - step.resting(b0);
@@ -227,7 +227,7 @@ Stage<kModes> stage(const BaseTrajectory& base, BaseAxis axis, const Followed& f
     chord += step.base(slope * s * duration, slope);
     const double t = from + end * duration;
     off = chord - (vector_of<kModes>(followed.at(t)) - step.resting(b0));
-    const double chord_off = slope * end * duration - (base.at(base.*axis, t).position_mm - b0);
+    const double chord_off = slope * end * duration - (base.at(base[axis], t).position_mm - b0);
     result.slope += position_of(off) * shape.of_nozzle[i] + chord_off * shape.of_base[i];
   }
   result.shape = &shape;
@@ -405,9 +405,9 @@ class Regulator {
 };
 
 // `reach`, widened to where the base itself goes.
-Reach with_base(Reach reach, const BaseTrajectory& base, BaseAxis axis) {
+Reach with_base(Reach reach, const BaseTrajectory& base, std::size_t axis) {
   for (std::size_t k = 0; k < base.nodes(); ++k) {
-    const double at = base.at(base.*axis, static_cast<double>(k) * base.period_s).position_mm;
+    const double at = base.at(base[axis], static_cast<double>(k) * base.period_s).position_mm;
     reach.min_mm = std::min(reach.min_mm, at);
     reach.max_mm = std::max(reach.max_mm, at);
   }
@@ -415,8 +415,8 @@ Reach with_base(Reach reach, const BaseTrajectory& base, BaseAxis axis) {
 }
 
 // The speed of the base at time t, or 0 where it rests.
-double speed_at(const BaseTrajectory& base, BaseAxis axis, double t, bool rests) {
-  return rests ? 0.0 : base.at(base.*axis, t).velocity_mm_s;
+double speed_at(const BaseTrajectory& base, std::size_t axis, double t, bool rests) {
+  return rests ? 0.0 : base.at(base[axis], t).velocity_mm_s;
 }
 
 // Sets the bounds of each u and of the last g.
@@ -446,10 +446,10 @@ void set_bounds(const SpeedSteps& most, double before_mm_s, double after_mm_s, c
 }
 
 template <int kModes>
-AxisVertices choose_vertices(const BaseTrajectory& base, BaseAxis axis, const FlexibleAxis& nozzle,
-                             const Followed& followed, const std::vector<double>& times,
-                             const AxisGrid& grid, const Reach& reach, const SpeedSteps& most,
-                             Ends ends) {
+AxisVertices choose_vertices(const BaseTrajectory& base, std::size_t axis,
+                             const FlexibleAxis& nozzle, const Followed& followed,
+                             const std::vector<double>& times, const AxisGrid& grid,
+                             const Reach& reach, const SpeedSteps& most, Ends ends) {
   constexpr int kZ = kOfZ<kModes>;
   const std::size_t lines = times.size() - 1;
   // By length of a step, and by that and their number; most lines are of a few lengths.
@@ -457,7 +457,7 @@ AxisVertices choose_vertices(const BaseTrajectory& base, BaseAxis axis, const Fl
   std::map<std::pair<std::int64_t, int>, Shape<kModes>> shapes;
   std::vector<Stage<kModes>> stages;
   stages.reserve(lines);
-  std::vector<double> on_curve = {base.at(base.*axis, 0.0).position_mm};
+  std::vector<double> on_curve = {base.at(base[axis], 0.0).position_mm};
   for (std::size_t k = 0; k < lines; ++k) {
     const double duration = times[k + 1] - times[k];
     const int count = static_cast<int>(std::ceil(duration / base.period_s - 1e-9));
@@ -470,7 +470,7 @@ AxisVertices choose_vertices(const BaseTrajectory& base, BaseAxis axis, const Fl
       shape = shapes.emplace(std::pair{length, count}, shape_of(step, count)).first;
     }
     stages.push_back(stage(base, axis, followed, step, shape->second, times[k], times[k + 1]));
-    on_curve.push_back(base.at(base.*axis, times[k + 1]).position_mm);
+    on_curve.push_back(base.at(base[axis], times[k + 1]).position_mm);
   }
   Ending<kModes> ending;
   set_bounds(most, speed_at(base, axis, times.front(), ends.from_rest),
@@ -521,7 +521,8 @@ double AxisGrid::nearest(double position_mm) const {
   return offset_mm + std::round((position_mm - offset_mm) / step_mm) * step_mm;
 }
 
-VertexChooser::VertexChooser(const BaseTrajectory& base, BaseAxis axis, const FlexibleAxis& nozzle)
+VertexChooser::VertexChooser(const BaseTrajectory& base, std::size_t axis,
+                             const FlexibleAxis& nozzle)
     : base_(&base), axis_(axis), nozzle_(nozzle), followed_(base, axis, nozzle) {}
 
 AxisVertices VertexChooser::choose(const std::vector<double>& times, const AxisGrid& grid,

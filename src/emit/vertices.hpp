@@ -18,6 +18,10 @@ struct AxisGrid {
 
   [[nodiscard]] double nearest(double position_mm) const;
 };
+[[nodiscard]] inline XY nearest(const Axes<AxisGrid>& grid, const XY& place_mm) {
+  return map_axes([](const AxisGrid& axis, double at_mm) { return axis.nearest(at_mm); }, grid,
+                  place_mm);
+}
 
 // Whether the base rests where the lines begin and end.
 struct Ends {
@@ -47,7 +51,7 @@ struct AxisVertices {
 // included.
 class VertexChooser {
  public:
-  VertexChooser(const dynamics::BaseTrajectory& base, BaseAxis axis,
+  VertexChooser(const dynamics::BaseTrajectory& base, std::size_t axis,
                 const dynamics::FlexibleAxis& nozzle);
 
   // For lines that end at times[1], times[2] …. The first and the last vertex are the base's own,
@@ -60,7 +64,7 @@ class VertexChooser {
 
  private:
   const dynamics::BaseTrajectory* base_;
-  BaseAxis axis_;
+  std::size_t axis_;
   dynamics::FlexibleAxis nozzle_;
   Followed followed_;
 };

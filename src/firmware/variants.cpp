@@ -105,8 +105,8 @@ SourcePlace first_place(const Draft& draft, std::initializer_list<std::string_vi
 }
 
 bool may_have_shaper(const Settings& s) {
-  return s.shaper_freq_x_hz() > 0.0 || s.shaper_freq_y_hz() > 0.0 || s.shaper_unknown_x() ||
-         s.shaper_unknown_y();
+  return any_axis([](double freq_hz, bool is_unknown) { return freq_hz > 0.0 || is_unknown; },
+                  s.shaper_freq_hz(), s.shaper_unknown());
 }
 
 void refuse(Draft& draft, SourcePlace place, std::string message) {

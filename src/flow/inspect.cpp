@@ -73,8 +73,8 @@ class Inspector {
                                        machine::firmware_config(settings))),
         steps_(machine::firmware_config(settings), run::step_rules(settings)),
         absolute_e_(!settings.printer.relative_extrusion) {
-    result_->x_min_mm = result_->y_min_mm = std::numeric_limits<double>::infinity();
-    result_->x_max_mm = result_->y_max_mm = -std::numeric_limits<double>::infinity();
+    result_->min_mm = on_all_axes(std::numeric_limits<double>::infinity());
+    result_->max_mm = on_all_axes(-std::numeric_limits<double>::infinity());
     result_->lowest_accel_mm_s2 = std::numeric_limits<double>::infinity();
   }
 
@@ -97,8 +97,8 @@ class Inspector {
     gcode::Event end;
     end.kind = gcode::EventKind::barrier;
     plan(end);
-    if (result_->x_min_mm > result_->x_max_mm) {
-      result_->x_min_mm = result_->x_max_mm = result_->y_min_mm = result_->y_max_mm = 0.0;
+    if (result_->min_mm.x > result_->max_mm.x) {
+      result_->min_mm = result_->max_mm = {};
     }
     if (result_->moves == 0) {
       result_->lowest_accel_mm_s2 = 0.0;
@@ -198,10 +198,12 @@ class Inspector {
     result_->path_length_mm += move.length_mm;
     if (segment.extruding()) {
       ++result_->extruding_moves;
-      result_->x_min_mm = std::min({result_->x_min_mm, segment.start_mm[0], segment.end_mm[0]});
-      result_->x_max_mm = std::max({result_->x_max_mm, segment.start_mm[0], segment.end_mm[0]});
-      result_->y_min_mm = std::min({result_->y_min_mm, segment.start_mm[1], segment.end_mm[1]});
-      result_->y_max_mm = std::max({result_->y_max_mm, segment.start_mm[1], segment.end_mm[1]});
+      for_each_axis(
+          [](double& min_mm, double& max_mm, double start_mm, double end_mm) {
+            min_mm = std::min({min_mm, start_mm, end_mm});
+            max_mm = std::max({max_mm, start_mm, end_mm});
+          },
+          result_->min_mm, result_->max_mm, xy_of(segment.start_mm), xy_of(segment.end_mm));
       result_->z_max_mm = std::max(result_->z_max_mm, segment.end_mm[gcode::Z]);
     }
     result_->lowest_accel_mm_s2 = std::min(result_->lowest_accel_mm_s2, move.accel_mm_s2);

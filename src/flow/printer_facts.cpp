@@ -42,11 +42,15 @@ std::string origin_of_axis(const machine::Settings& settings, const std::string&
 }
 
 std::string travel_text(const machine::PrinterSettings& printer) {
-  if (!printer.travel_x_mm || !printer.travel_y_mm) {
-    return {};
-  }
-  return fmt::format("X {:g} to {:g}, Y {:g} to {:g} mm", printer.travel_x_mm->min,
-                     printer.travel_x_mm->max, printer.travel_y_mm->min, printer.travel_y_mm->max);
+  std::vector<std::string> ranges;
+  for_each_axis(
+      [&](std::string_view letter, const std::optional<machine::Range>& travel) {
+        if (travel) {
+          ranges.push_back(fmt::format("{} {:g} to {:g}", letter, travel->min, travel->max));
+        }
+      },
+      kAxisLetters, printer.travel_mm);
+  return ranges.size() == XY::kCount ? fmt::format("{} mm", fmt::join(ranges, ", ")) : "";
 }
 
 std::string lines_source(const machine::PrinterSettings& printer) {
@@ -63,30 +67,34 @@ std::string lines_source(const machine::PrinterSettings& printer) {
 
 std::optional<record::PrinterShaper> printer_shaper(const verify::Rules& rules) {
   gcode::Shaper shaper;
-  shaper.freq_x_hz = rules.interpreter.shaper_freq_x_hz;
-  shaper.freq_y_hz = rules.interpreter.shaper_freq_y_hz;
+  shaper.freq_hz = rules.interpreter.shaper_freq_hz;
   planner::Shaping shaping = planner::shaping(rules.fixed, shaper);
   if (!shaping.acts()) {
     return std::nullopt;
   }
   const planner::InstalledShaper& installed = rules.fixed.shaper;
-  std::string name = shaper_text(installed.type_x, shaper.freq_x_hz);
-  if (const std::string y = shaper_text(installed.type_y, shaper.freq_y_hz); y != name) {
+  std::string name = shaper_text(installed.type.x, shaper.freq_hz.x);
+  if (const std::string y = shaper_text(installed.type.y, shaper.freq_hz.y); y != name) {
     const bool differs_in_hz_only =
-        installed.type_x == installed.type_y && !shaping.x.empty() && !shaping.y.empty();
-    name += "/" + (differs_in_hz_only ? fmt::format("{:.4g}", shaper.freq_y_hz) : y);
+        installed.type.x == installed.type.y &&
+        all_axes([](const dynamics::ShaperPulses& pulses) { return !pulses.empty(); }, shaping);
+    name += "/" + (differs_in_hz_only ? fmt::format("{:.4g}", shaper.freq_hz.y) : y);
   }
-  return record::PrinterShaper{name + " Hz", std::move(shaping.x), std::move(shaping.y)};
+  return record::PrinterShaper{name + " Hz", std::move(shaping)};
 }
 
 report::PrinterFacts printer_facts(const machine::Settings& settings) {
   report::PrinterFacts facts;
-  facts.axes = {{"X", settings.dynamics_x.description(), origin_of_axis(settings, "x")},
-                {"Y", settings.dynamics_y.description(), origin_of_axis(settings, "y")}};
+  for_each_axis(
+      [&](std::string_view letter, std::string_view key, const machine::AxisDynamics& axis) {
+        facts.axes.push_back(
+            {std::string(letter), axis.description(), origin_of_axis(settings, std::string(key))});
+      },
+      kAxisLetters, kAxisKeys, settings.dynamics);
   if (const auto own = printer_shaper(run::verify_rules(settings))) {
     facts.shaper = own->name;
   }
-  facts.shaper_unknown = settings.shaper_unknown_x() || settings.shaper_unknown_y();
+  facts.shaper_unknown = any_axis(std::identity{}, settings.shaper_unknown());
   facts.motor_max_velocity_mm_s = settings.motor_max_velocity_mm_s();
   facts.motor_max_accel_mm_s2 = settings.motor_max_accel_mm_s2();
   facts.motor_max_accel_origin = origin_of(settings, settings.motor_max_accel_key());

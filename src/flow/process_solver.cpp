@@ -11,9 +11,9 @@ void ProcessSolver::submit(const std::shared_ptr<run::RunJob>& job, std::size_t 
   for (std::size_t i = 0; i < count; ++i) {
     const compensate::WindowSpan& span = job->windows.spans[first + i];
     compensate::prepare(*divider_, span, windows[i]);
-    for (std::size_t axis = 0; axis < 2; ++axis) {
+    for (std::size_t axis = 0; axis < XY::kCount; ++axis) {
       tickets_.push_back({job, first + i, axis});
-      const compensate::AxisWindow& window = axis == 0 ? windows[i].x : windows[i].y;
+      const compensate::AxisWindow& window = windows[i][axis];
       if (span.cruise) {
         // A cruise is never a run's last window. So take() gets the run's last solution.
         job->windows.results[first + i][axis] = run::axis_result(compensate::along(window));

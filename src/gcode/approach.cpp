@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "unflex/core/math.hpp"
 #include "unflex/gcode/interpreter.hpp"
@@ -63,7 +64,8 @@ std::optional<std::string> Interpreter::approach(const Line& line) const {
     return fmt::format("G4 P{:.0f}{}", std::ceil(swinging_s_ * 1e3), line_end);
   }
   const std::array<bool, 4> taken = known_or_assumed();
-  if ((state_.known[X] && state_.known[Y]) || !taken[X] || !taken[Y]) {
+  if (all_axes(std::identity{}, axes_of(state_.known)) ||
+      !all_axes(std::identity{}, axes_of(taken))) {
     return std::nullopt;
   }
   const Command command = parse(line.content());
@@ -77,23 +79,21 @@ std::optional<std::string> Interpreter::approach(const Line& line) const {
   if (!is_plain_travel(command)) {
     return std::nullopt;
   }
-  const auto target_mm = [&](Axis axis, char letter) {
-    return state_.base_mm[axis] + *command.value(letter) * state_.unit_mm;
-  };
-  const double x_mm = target_mm(X, 'X');
-  const double y_mm = target_mm(Y, 'Y');
-  const double way_mm = math::hypot(x_mm - state_.position_mm[X], y_mm - state_.position_mm[Y]);
+  const XY zero_mm = xy_of(state_.base_mm);
+  const XY from_mm = xy_of(state_.position_mm);
+  const XY words{*command.value('X'), *command.value('Y')};
+  const XY whole_way_mm = zero_mm + state_.unit_mm * words - from_mm;
+  const double way_mm = length(whole_way_mm);
   if (!(way_mm >= kShortest_mm)) {
     return std::nullopt;
   }
   const double share = std::max(kLeastShare, 1.0 - kLeft_mm / way_mm);
-  const auto reading = [&](Axis axis, double to_mm) {
-    const double from_mm = state_.position_mm[axis];
-    return (from_mm + share * (to_mm - from_mm) - state_.base_mm[axis]) / state_.unit_mm;
-  };
+  const XY reading = (from_mm + share * whole_way_mm - zero_mm) / state_.unit_mm;
   const int decimals = state_.unit_mm == 1.0 ? kDecimals : kDecimalsOfInches;
-  std::string text = fmt::format("G{} X{:.{}f} Y{:.{}f}", command.number, reading(X, x_mm),
-                                 decimals, reading(Y, y_mm), decimals);
+  std::string text = fmt::format("G{}", command.number);
+  for_each_axis([&](std::string_view letter,
+                    double value) { text += fmt::format(" {}{:.{}f}", letter, value, decimals); },
+                kAxisLetters, reading);
   if (const std::optional<double> feed = command.value('F')) {
     text += fmt::format(" F{}", *feed);
   }
@@ -104,11 +104,14 @@ std::optional<std::string> Interpreter::approach(const Line& line) const {
 // file's own limits, which the line itself would not do.
 std::string Interpreter::go_where_assumed() const {
   constexpr double kExact = 1e9;
-  const auto reading = [&](Axis axis) {
-    const double exact = (state_.position_mm[axis] - state_.base_mm[axis]) / state_.unit_mm;
-    return std::round(exact * kExact) / kExact + 0.0;
-  };
-  return fmt::format("G1 X{} Y{}", reading(X), reading(Y));
+  std::string text = "G1";
+  for_each_axis(
+      [&](std::string_view letter, double position_mm, double zero_mm) {
+        const double exact = (position_mm - zero_mm) / state_.unit_mm;
+        text += fmt::format(" {}{}", letter, std::round(exact * kExact) / kExact + 0.0);
+      },
+      kAxisLetters, xy_of(state_.position_mm), xy_of(state_.base_mm));
+  return text;
 }
 
 }  // namespace unflex::gcode

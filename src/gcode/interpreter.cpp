@@ -53,10 +53,8 @@ double ModalState::filament_factor() const {
 }
 
 Interpreter::Interpreter(InterpreterOptions options) : options_(std::move(options)) {
-  state_.shaper_freq_x_hz = options_.shaper_freq_x_hz;
-  state_.shaper_freq_y_hz = options_.shaper_freq_y_hz;
-  state_.shaper_unknown_x = options_.shaper_unknown_x;
-  state_.shaper_unknown_y = options_.shaper_unknown_y;
+  state_.shaper_freq_hz = options_.shaper_freq_hz;
+  state_.shaper_unknown = options_.shaper_unknown;
   state_.filament_diameter_mm = options_.filament_diameter_mm;
   state_.absolute_e = !options_.relative_e;
   if (options_.begins_advanced) {
@@ -66,10 +64,10 @@ Interpreter::Interpreter(InterpreterOptions options) : options_(std::move(option
   state_.g91_covers_e = spec.reading.g91_covers_e;
   state_.feed_mm_s = spec.reading.first_feed_mm_s;
   if (spec.filters.shapes_both_axes_alike) {
-    const bool shapes = options_.shaper_freq_x_hz > 0.0;
+    const bool shapes = options_.shaper_freq_hz.x > 0.0;
     state_.shaper.kept_freq_hz =
-        shapes ? std::optional<double>(options_.shaper_freq_x_hz) : std::nullopt;
-    state_.shaper.type_x = state_.shaper.type_y = shapes ? options_.shaper_type : "none";
+        shapes ? std::optional<double>(options_.shaper_freq_hz.x) : std::nullopt;
+    state_.shaper.type = on_all_axes<std::string>(shapes ? options_.shaper_type : "none");
   }
 }
 
@@ -145,7 +143,7 @@ void Interpreter::home(Event& event) {
   event.position_lost = true;
   const bool some_named = command_.has_any("XYZ");
   assumed_.fill(false);
-  for (const Axis axis : {X, Y, Z}) {
+  for (const Axis axis : kXYZ) {
     state_.known[axis] = false;
     if (!some_named || command_.has(kAxisLetters[axis])) {
       state_.base_mm[axis] = state_.offset_mm[axis];
@@ -156,7 +154,7 @@ void Interpreter::home(Event& event) {
 
 void Interpreter::set_position(Event& event) {
   std::array<bool, 4> named{};
-  for (const Axis axis : {X, Y, Z, E}) {
+  for (const Axis axis : kXYZE) {
     const char letter = kAxisLetters[axis];
     named[axis] = command_.has(letter);
     if (named[axis] && !command_.value(letter)) {
@@ -166,7 +164,7 @@ void Interpreter::set_position(Event& event) {
   // Only Klipper takes a bare G92 for all axes.
   const bool bare = spec_of(options_.firmware).reading.bare_g92_sets_all &&
                     std::none_of(named.begin(), named.end(), [](bool is) { return is; });
-  for (const Axis axis : {X, Y, Z, E}) {
+  for (const Axis axis : kXYZE) {
     if (bare || named[axis]) {
       const double scale = axis == E ? state_.filament_per_e_mm() : state_.unit_mm;
       const double reading = bare ? 0.0 : *command_.value(kAxisLetters[axis]);
@@ -182,7 +180,7 @@ void Interpreter::set_position(Event& event) {
   }
   // Only RepRapFirmware stops at G92. But rewritten motion must not reach across a change of the
   // zero.
-  if (bare || named[X] || named[Y] || named[Z]) {
+  if (bare || any_axis(std::identity{}, axes_of(named)) || named[Z]) {
     event.kind = EventKind::barrier;
   }
 }
@@ -277,14 +275,14 @@ void Interpreter::limit(Event& event, char letter, double scale, double least,
 }
 
 void Interpreter::axis_limits(Event& event, double scale, double least, AxisValues& values) {
-  for (const Axis axis : {X, Y, Z, E}) {
+  for (const Axis axis : kXYZE) {
     limit(event, kAxisLetters[axis], scale, least, values[axis]);
   }
 }
 
 // M92. The planner keeps the steps of its configuration, so a different value is warned of.
 void Interpreter::steps_per_mm(Event& event) {
-  for (const Axis axis : {X, Y, Z, E}) {
+  for (const Axis axis : kXYZE) {
     const char letter = kAxisLetters[axis];
     const std::optional<double> steps = command_.value(letter);
     if (!steps || *steps <= 0.0 || state_.steps_per_mm[axis] == steps) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -34,7 +35,7 @@ struct Target {
   bool feed_is_none = false;
   const char* problem = nullptr;
 
-  [[nodiscard]] bool moves() const { return named[X] || named[Y] || named[Z] || named[E]; }
+  [[nodiscard]] bool moves() const { return std::ranges::any_of(named, std::identity{}); }
 };
 
 std::optional<Axis> axis_of(char letter) {
@@ -122,14 +123,14 @@ Target read_target(const Command& command, const ModalState& state, Firmware fir
 bool starts_known(const Target& target, const std::array<bool, 4>& known, bool in_xy_plane = true) {
   const bool e_known = known[E] || !target.named[E] || !target.e_absolute;
   const bool z_known = known[Z] || (in_xy_plane && !target.named[Z]);
-  return known[X] && known[Y] && z_known && e_known;
+  return all_axes(std::identity{}, axes_of(known)) && z_known && e_known;
 }
 
 // Once an axis has been sent to an absolute reading, its position is known. True if it was unknown
 // for some axis. Then the machine may have moved although the numbers show no motion.
 bool settle(const Target& target, ModalState& state) {
   bool was_unknown = false;
-  for (const Axis axis : {X, Y, Z, E}) {
+  for (const Axis axis : kXYZE) {
     const bool absolute = axis == E ? target.e_absolute : state.absolute_xyz;
     if (target.named[axis] && absolute && !state.known[axis]) {
       was_unknown = true;
@@ -237,7 +238,7 @@ std::string too_much_filament(const Segment& segment, Firmware firmware) {
 
 }  // namespace
 
-double Segment::length_xy_mm() const { return length(delta(X), delta(Y), 0.0); }
+double Segment::length_xy_mm() const { return std::sqrt(squared(way_xy_mm())); }
 
 double Segment::length_mm() const { return length(delta(X), delta(Y), delta(Z)); }
 
@@ -259,9 +260,9 @@ void Interpreter::note_lost_motion(Event& event, const std::array<bool, 4>& know
   }
   const Target target = read_target(command_, state_, options_.firmware);
   const Position& from = state_.position_mm;
-  if (target.problem == nullptr && known[X] && known[Y] && target.position_mm[E] > from[E]) {
-    event.lost_path_mm =
-        length(target.position_mm[X] - from[X], target.position_mm[Y] - from[Y], 0.0);
+  if (target.problem == nullptr && all_axes(std::identity{}, axes_of(known)) &&
+      target.position_mm[E] > from[E]) {
+    event.lost_path_mm = std::sqrt(squared(xy_of(target.position_mm) - xy_of(from)));
   }
 }
 
@@ -377,7 +378,7 @@ void Interpreter::set_feed(std::optional<double> feed_word) {
 
 std::array<bool, 4> Interpreter::known_or_assumed() const {
   std::array<bool, 4> known = state_.known;
-  for (const Axis axis : {X, Y}) {
+  for (const Axis axis : kXY) {
     known[axis] = known[axis] || assumed_[axis];
   }
   return known;
@@ -388,7 +389,7 @@ void Interpreter::append_segment(Event& event, const Position& target, double fe
   Segment segment{state_.position_mm, target,        feed_mm_s,      event.line.number,
                   start.known,        start.assumed, curve_radius_mm};
   if (segment.length_mm() < kShortestMove_mm) {
-    for (const Axis axis : {X, Y, Z}) {
+    for (const Axis axis : kXYZ) {
       segment.end_mm[axis] = segment.start_mm[axis];
     }
     // A smaller change of E is round-off between two ways to the same reading, not a move. (Klipper

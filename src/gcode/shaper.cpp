@@ -1,5 +1,6 @@
 // M593 of Marlin and RepRapFirmware. Klipper's SET_INPUT_SHAPER is in extended.cpp.
 #include <algorithm>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -37,24 +38,33 @@ std::string shaper_name(std::string_view arguments) {
 // feature/input_shaping/M593.cpp; a new frequency waits for the end of all motion
 // (stepper.cpp, set_shaping_frequency). With neither X nor Y it is for both.
 void Interpreter::marlin_shaper(Event& event) {
-  const bool for_x = command_.has('X') || !command_.has('Y');
-  const bool for_y = command_.has('Y') || !command_.has('X');
+  const Axes<bool> named{command_.has('X'), command_.has('Y')};
+  const bool names_none = !any_axis(std::identity{}, named);
+  const auto for_each_named = [&](auto&& set, auto&... of_axis) {
+    for_each_axis(
+        [&](bool is_named, auto&... value) {
+          if (is_named || names_none) {
+            set(value...);
+          }
+        },
+        named, of_axis...);
+  };
   const std::optional<double> ratio = command_.value('D');
   if (ratio && *ratio >= 0.0 && *ratio <= 1.0) {
-    state_.shaper.damping_ratio_x = for_x ? ratio : state_.shaper.damping_ratio_x;
-    state_.shaper.damping_ratio_y = for_y ? ratio : state_.shaper.damping_ratio_y;
+    for_each_named([&](std::optional<double>& value) { value = ratio; },
+                   state_.shaper.damping_ratio);
   }
   const std::optional<double> freq_hz = command_.value('F');
   if (!freq_hz || *freq_hz < 0.0) {
     return;
   }
   event.kind = EventKind::barrier;
-  state_.shaper_unknown_x = state_.shaper_unknown_x && !for_x;
-  state_.shaper_unknown_y = state_.shaper_unknown_y && !for_y;
-  state_.shaper_touched_x = state_.shaper_touched_x && !for_x;
-  state_.shaper_touched_y = state_.shaper_touched_y && !for_y;
-  state_.shaper_freq_x_hz = for_x ? *freq_hz : state_.shaper_freq_x_hz;
-  state_.shaper_freq_y_hz = for_y ? *freq_hz : state_.shaper_freq_y_hz;
+  for_each_named(
+      [&](bool& unknown, bool& touched, double& value_hz) {
+        unknown = touched = false;
+        value_hz = *freq_hz;
+      },
+      state_.shaper_unknown, state_.shaper_touched, state_.shaper_freq_hz);
   note_shaper(event);
 }
 
@@ -71,22 +81,20 @@ void Interpreter::rrf_shaper(Event& event) {
   ShaperSettings& shaper = state_.shaper;
   const auto freq_hz = command_.value('F');
   const auto ratio = command_.value('S');
-  const bool is_off = state_.shaper_freq_x_hz == 0.0;
+  const bool is_off = state_.shaper_freq_hz.x == 0.0;
   constexpr double kDefaultFreq_hz = 40.0;  // AxisShaper.h
   shaper.kept_freq_hz = freq_hz ? freq_hz : shaper.kept_freq_hz.value_or(kDefaultFreq_hz);
   if (ratio) {
-    shaper.damping_ratio_x = shaper.damping_ratio_y = ratio;
+    shaper.damping_ratio = on_all_axes(ratio);
   }
   if (has_type) {
-    shaper.type_x = shaper.type_y = shaper_name(command_.arguments);
+    shaper.type = on_all_axes(shaper_name(command_.arguments));
   } else if (is_off) {
-    shaper.type_x = shaper.type_y = "zvd";
+    shaper.type = on_all_axes<std::string>("zvd");
   }
-  shaper.custom_words = shaper.type_x == "custom" ? std::string(command_.arguments) : "";
-  state_.shaper_freq_x_hz = shaper.type_x == "none" ? 0.0 : *shaper.kept_freq_hz;
-  state_.shaper_freq_y_hz = state_.shaper_freq_x_hz;
-  state_.shaper_unknown_x = state_.shaper_unknown_y = false;
-  state_.shaper_touched_x = state_.shaper_touched_y = false;
+  shaper.custom_words = shaper.type.x == "custom" ? std::string(command_.arguments) : "";
+  state_.shaper_freq_hz = on_all_axes(shaper.type.x == "none" ? 0.0 : *shaper.kept_freq_hz);
+  state_.shaper_unknown = state_.shaper_touched = on_all_axes(false);
   note_shaper(event);
 }
 

@@ -17,7 +17,7 @@ bool same_modes(const ModalState& a, const ModalState& b) {
          a.unit_mm == b.unit_mm && a.speed_factor == b.speed_factor &&
          a.filament_factor() == b.filament_factor() && a.plane == b.plane &&
          a.retracted == b.retracted && a.inverse_time == b.inverse_time &&
-         a.shaper_freq_x_hz == b.shaper_freq_x_hz && a.shaper == b.shaper;
+         a.shaper_freq_hz.x == b.shaper_freq_hz.x && a.shaper == b.shaper;
 }
 
 }  // namespace
@@ -63,7 +63,7 @@ void Interpreter::lose_position(Event& event) {
   event.position_lost = true;
   state_.known.fill(false);
   assumed_.fill(false);
-  state_.shaper_touched_x = state_.shaper_touched_y = true;
+  state_.shaper_touched = on_all_axes(true);
   // Another extruder may be in use, so the next value may stop the machine. The last value known is
   // still the best guess.
   if (options_.advance_of_runs != RunAdvance::on) {

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <numbers>
 
 #include "unflex/core/firmware_spec.hpp"
+#include "unflex/core/xy.hpp"
 
 namespace unflex::machine {
 namespace {
@@ -27,9 +29,8 @@ double max_extrude_ratio(const Settings& settings) {
 }  // namespace
 
 double grid_mm(const Settings& settings) {
-  const std::array<double, 4> steps_per_mm = settings.steps_per_mm();
   return settings.spec().motion.rounds_to_steps
-             ? 1.0 / std::min(steps_per_mm[gcode::X], steps_per_mm[gcode::Y])
+             ? 1.0 / least_of_axes(std::identity{}, xy_of(settings.steps_per_mm()))
              : kGrid_mm;
 }
 
@@ -51,14 +52,12 @@ dynamics::FlexibleAxis behind(const dynamics::FlexibleAxis& axis, double freq_hz
   return freq_hz > 0.0 ? axis.followed_by(2.0 * std::numbers::pi * freq_hz, damping_ratio) : axis;
 }
 
-dynamics::FlexibleAxis nozzle_x(const Settings& settings) {
-  return behind(flexible_axis(settings.dynamics_x), settings.second.x_freq_hz,
-                settings.second.x_damping_ratio);
-}
-
-dynamics::FlexibleAxis nozzle_y(const Settings& settings) {
-  return behind(flexible_axis(settings.dynamics_y), settings.second.y_freq_hz,
-                settings.second.y_damping_ratio);
+Axes<dynamics::FlexibleAxis> nozzle_axes(const Settings& settings) {
+  return map_axes(
+      [](const AxisDynamics& axis, double second_hz, double second_damping_ratio) {
+        return behind(flexible_axis(axis), second_hz, second_damping_ratio);
+      },
+      settings.dynamics, settings.second.freq_hz, settings.second.damping_ratio);
 }
 
 gcode::InterpreterOptions interpreter_options(const Settings& settings) {
@@ -79,16 +78,14 @@ gcode::InterpreterOptions interpreter_options(const Settings& settings) {
       .min_circle_segments = static_cast<int>(settings.printer.min_circle_segments),
       .correction_interval = static_cast<int>(settings.printer.arc_correction_interval),
       .circles = settings.printer.arc_p_circles};
-  options.shaper_freq_x_hz = settings.shaper_freq_x_hz();
-  options.shaper_freq_y_hz = settings.shaper_freq_y_hz();
-  options.shaper_unknown_x = settings.shaper_unknown_x();
-  options.shaper_unknown_y = settings.shaper_unknown_y();
-  options.shaper_type = settings.shaper_type_x();
+  options.shaper_freq_hz = settings.shaper_freq_hz();
+  options.shaper_unknown = settings.shaper_unknown();
+  options.shaper_type = settings.shaper_type().x;
   options.has_print_jerk = settings.has_print_jerk();
   options.filament_diameter_mm = settings.extruder.filament_diameter_mm;
   options.steps_per_mm = settings.steps_per_mm();
-  const double settling_s =
-      std::max(nozzle_x(settings).settling_s(), nozzle_y(settings).settling_s());
+  const double settling_s = most_of_axes(
+      [](const dynamics::FlexibleAxis& axis) { return axis.settling_s(); }, nozzle_axes(settings));
   options.settling_s = std::min(settling_s, kLongestCalm_s);
   if (settings.writes_pressure() && settings.printer_presses()) {
     options.advance_of_runs = gcode::RunAdvance::on;
@@ -140,8 +137,7 @@ planner::FirmwareConfig firmware_config(const Settings& settings) {
                                   ? settings.printer.linear_advance_s
                                   : settings.extruder.pressure_advance_s;
   config.pressure_advance_smooth_s = settings.extruder.pressure_advance_smooth_s;
-  config.shaper = {settings.shaper_type_x(), settings.shaper_type_y(),
-                   settings.shaper_damping_ratio_x(), settings.shaper_damping_ratio_y()};
+  config.shaper = {settings.shaper_type(), settings.shaper_damping_ratio()};
   config.steps_per_mm = settings.steps_per_mm();
   config.classic_jerk = settings.printer.classic_jerk;
   config.min_steps_per_segment = static_cast<int>(settings.printer.min_steps_per_segment);

@@ -36,8 +36,7 @@ struct Note {
 struct Draft {
   Settings settings;
   std::vector<Note> notes;
-  MassSpringDamper mass_x;
-  MassSpringDamper mass_y;
+  Axes<MassSpringDamper> mass;
   // Parallel to key_table(): where the key was given last; empty while it has its default.
   std::vector<std::optional<SourcePlace>> places;
   std::string printer_file;  // the name it goes by in messages; empty if none is given

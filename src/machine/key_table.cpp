@@ -18,9 +18,15 @@ auto& setting(Draft& draft) {
   return draft.settings.*Section.*Field;
 }
 
-template <auto Axis, auto Field>
+// axis: as in Axes.
+template <auto Member, std::size_t Axis, auto Field>
+auto& axis_setting(Draft& draft) {
+  return (draft.settings.*Member)[Axis].*Field;
+}
+
+template <std::size_t Axis, auto Field>
 auto& mass_form(Draft& draft) {
-  return draft.*Axis.*Field;
+  return draft.mass[Axis].*Field;
 }
 
 template <double (Settings::*Derived)() const>
@@ -29,19 +35,20 @@ double derived(const Settings& settings) {
 }
 
 template <auto Section, auto Field, std::size_t Index>
-std::optional<double>& of_axis(Draft& draft) {
+auto& of_axis(Draft& draft) {
   return (draft.settings.*Section.*Field)[Index];
 }
 
-template <std::array<double, 4> (Settings::*Derived)() const, std::size_t Index>
+template <auto Derived, std::size_t Index>
 double derived_of_axis(const Settings& settings) {
   return (settings.*Derived)()[Index];
 }
 
 // Infinity, which no key takes, stands for a value that is not known.
-template <double (Settings::*Freq)() const, bool (Settings::*Unknown)() const>
+template <std::size_t Axis>
 double known_shaper(const Settings& settings) {
-  return (settings.*Unknown)() ? std::numeric_limits<double>::infinity() : (settings.*Freq)();
+  return settings.shaper_unknown()[Axis] ? std::numeric_limits<double>::infinity()
+                                         : settings.shaper_freq_hz()[Axis];
 }
 
 using S = Settings;
@@ -109,9 +116,9 @@ constexpr std::array kKeys = {
         {},
         nullptr,
         kTransports},
-    Key{"printer.travel_x_mm", &setting<&S::printer, &P::travel_x_mm>, kAny, "mm",
+    Key{"printer.travel_x_mm", &of_axis<&S::printer, &P::travel_mm, 0>, kAny, "mm",
         "The base's travel along X, [min, max]", kNotLimited},
-    Key{"printer.travel_y_mm", &setting<&S::printer, &P::travel_y_mm>, kAny, "mm",
+    Key{"printer.travel_y_mm", &of_axis<&S::printer, &P::travel_mm, 1>, kAny, "mm",
         "The base's travel along Y, [min, max]", kNotLimited},
     Key{"printer.relative_extrusion", &setting<&S::printer, &P::relative_extrusion>, kAny, "",
         "E words are differences before the file's first M82 or M83, since a start macro or "
@@ -194,17 +201,16 @@ constexpr std::array kKeys = {
     Key{"printer.step_clock_hz", &setting<&S::printer, &P::step_clock_hz>,
         Bounds{.min = 1e5, .max = 1e8}, "Hz",
         "RRF: StepClockRate, 750000 on a Duet 3, 937500 on a Duet 2"},
-    Key{"printer.input_shaper_freq_x_hz", &setting<&S::printer, &P::input_shaper_freq_x_hz>,
+    Key{"printer.input_shaper_freq_x_hz", &of_axis<&S::printer, &P::input_shaper_freq_hz, 0>,
         kNotNegative, "Hz",
         "What the printer's own [input_shaper] is set back to after the print; 0 if it has none",
-        "not known", &known_shaper<&S::shaper_freq_x_hz, &S::shaper_unknown_x>},
-    Key{"printer.input_shaper_freq_y_hz", &setting<&S::printer, &P::input_shaper_freq_y_hz>,
+        "not known", &known_shaper<0>},
+    Key{"printer.input_shaper_freq_y_hz", &of_axis<&S::printer, &P::input_shaper_freq_hz, 1>,
         kNotNegative, "Hz",
         "What the printer's own [input_shaper] is set back to after the print; 0 if it has none",
-        "not known, RRF printer.input_shaper_freq_x_hz",
-        &known_shaper<&S::shaper_freq_y_hz, &S::shaper_unknown_y>},
+        "not known, RRF printer.input_shaper_freq_x_hz", &known_shaper<1>},
     Key{"printer.input_shaper_type",
-        &setting<&S::printer, &P::input_shaper_type>,
+        &of_axis<&S::printer, &P::input_shaper_type, 0>,
         kAny,
         "",
         "Type of the printer's own shaper as the firmware spells it, Klipper's mzv(n=4,t=0.9) too; "
@@ -215,7 +221,7 @@ constexpr std::array kKeys = {
         false,
         &is_mzv},
     Key{"printer.input_shaper_type_y",
-        &setting<&S::printer, &P::input_shaper_type_y>,
+        &of_axis<&S::printer, &P::input_shaper_type, 1>,
         kAny,
         "",
         "Klipper: type of the printer's own shaper along Y; auto: as along X",
@@ -225,15 +231,15 @@ constexpr std::array kKeys = {
         false,
         &is_mzv},
     Key{"printer.input_shaper_damping_ratio_x",
-        &setting<&S::printer, &P::input_shaper_damping_ratio_x>,
+        &of_axis<&S::printer, &P::input_shaper_damping_ratio, 0>,
         Bounds{.min = 0.0, .max = 1.0, .max_open = true}, "",
         "The damping ratio that the printer's own shaper is built for", "0.1, Marlin 0.15",
-        &derived<&S::shaper_damping_ratio_x>},
+        &derived_of_axis<&S::shaper_damping_ratio, 0>},
     Key{"printer.input_shaper_damping_ratio_y",
-        &setting<&S::printer, &P::input_shaper_damping_ratio_y>,
+        &of_axis<&S::printer, &P::input_shaper_damping_ratio, 1>,
         Bounds{.min = 0.0, .max = 1.0, .max_open = true}, "",
         "The damping ratio that the printer's own shaper is built for", "0.1, Marlin 0.15",
-        &derived<&S::shaper_damping_ratio_y>},
+        &derived_of_axis<&S::shaper_damping_ratio, 1>},
 
     Key{"limits.max_velocity_mm_s", &setting<&S::limits, &L::max_velocity_mm_s>, kPositive, "mm/s",
         "Klipper: [printer] max_velocity; the others: the larger of X and Y"},
@@ -413,20 +419,20 @@ constexpr std::array kKeys = {
         nullptr,
         kAheadWhen},
 
-    Key{"dynamics.x.freq_hz", &setting<&S::dynamics_x, &D::freq_hz>,
+    Key{"dynamics.x.freq_hz", &axis_setting<&S::dynamics, 0, &D::freq_hz>,
         Bounds{.min = 1.0, .max = 1000.0}, "Hz", "Natural frequency of the nozzle along X"},
-    Key{"dynamics.x.damping_ratio", &setting<&S::dynamics_x, &D::damping_ratio>,
+    Key{"dynamics.x.damping_ratio", &axis_setting<&S::dynamics, 0, &D::damping_ratio>,
         Bounds{.min = 0.0, .max = 1.0}, "", "Damping ratio ζ along X"},
-    Key{"dynamics.x.mode", &setting<&S::dynamics_x, &D::modes>, kAny, "",
+    Key{"dynamics.x.mode", &axis_setting<&S::dynamics, 0, &D::modes>, kAny, "",
         "Modes along X, in place of freq_hz and damping_ratio: [[dynamics.x.mode]] with freq_hz, "
         "damping_ratio and gain; the gains add up to 1",
         "one mode"},
-    Key{"dynamics.x.plant", &setting<&S::dynamics_x, &D::plants>, kAny, "",
+    Key{"dynamics.x.plant", &axis_setting<&S::dynamics, 0, &D::plants>, kAny, "",
         "Other models that X may have: [[dynamics.x.plant]] with share, its probability, and mode, "
         "a list as above; the base then suits them all",
         "none"},
     Key{"dynamics.x.mass_g",
-        &mass_form<&Draft::mass_x, &M::mass_g>,
+        &mass_form<0, &M::mass_g>,
         kPositive,
         "g",
         "Mass that hangs on the X belt, instead of freq_hz",
@@ -435,7 +441,7 @@ constexpr std::array kKeys = {
         {},
         true},
     Key{"dynamics.x.stiffness_n_mm",
-        &mass_form<&Draft::mass_x, &M::stiffness_n_mm>,
+        &mass_form<0, &M::stiffness_n_mm>,
         kPositive,
         "N/mm",
         "Stiffness of the X belt, instead of freq_hz",
@@ -444,7 +450,7 @@ constexpr std::array kKeys = {
         {},
         true},
     Key{"dynamics.x.damping_n_s_mm",
-        &mass_form<&Draft::mass_x, &M::damping_n_s_mm>,
+        &mass_form<0, &M::damping_n_s_mm>,
         kNotNegative,
         "N·s/mm",
         "Damping of the X belt, instead of damping_ratio",
@@ -452,20 +458,20 @@ constexpr std::array kKeys = {
         nullptr,
         {},
         true},
-    Key{"dynamics.y.freq_hz", &setting<&S::dynamics_y, &D::freq_hz>,
+    Key{"dynamics.y.freq_hz", &axis_setting<&S::dynamics, 1, &D::freq_hz>,
         Bounds{.min = 1.0, .max = 1000.0}, "Hz", "Natural frequency of the nozzle along Y"},
-    Key{"dynamics.y.damping_ratio", &setting<&S::dynamics_y, &D::damping_ratio>,
+    Key{"dynamics.y.damping_ratio", &axis_setting<&S::dynamics, 1, &D::damping_ratio>,
         Bounds{.min = 0.0, .max = 1.0}, "", "Damping ratio ζ along Y"},
-    Key{"dynamics.y.mode", &setting<&S::dynamics_y, &D::modes>, kAny, "",
+    Key{"dynamics.y.mode", &axis_setting<&S::dynamics, 1, &D::modes>, kAny, "",
         "Modes along Y, in place of freq_hz and damping_ratio: [[dynamics.y.mode]] with freq_hz, "
         "damping_ratio and gain; the gains add up to 1",
         "one mode"},
-    Key{"dynamics.y.plant", &setting<&S::dynamics_y, &D::plants>, kAny, "",
+    Key{"dynamics.y.plant", &axis_setting<&S::dynamics, 1, &D::plants>, kAny, "",
         "Other models that Y may have: [[dynamics.y.plant]] with share, its probability, and mode, "
         "a list as above; the base then suits them all",
         "none"},
     Key{"dynamics.y.mass_g",
-        &mass_form<&Draft::mass_y, &M::mass_g>,
+        &mass_form<1, &M::mass_g>,
         kPositive,
         "g",
         "Mass that hangs on the Y belt, instead of freq_hz",
@@ -474,7 +480,7 @@ constexpr std::array kKeys = {
         {},
         true},
     Key{"dynamics.y.stiffness_n_mm",
-        &mass_form<&Draft::mass_y, &M::stiffness_n_mm>,
+        &mass_form<1, &M::stiffness_n_mm>,
         kPositive,
         "N/mm",
         "Stiffness of the Y belt, instead of freq_hz",
@@ -483,7 +489,7 @@ constexpr std::array kKeys = {
         {},
         true},
     Key{"dynamics.y.damping_n_s_mm",
-        &mass_form<&Draft::mass_y, &M::damping_n_s_mm>,
+        &mass_form<1, &M::damping_n_s_mm>,
         kNotNegative,
         "N·s/mm",
         "Damping of the Y belt, instead of damping_ratio",
@@ -501,14 +507,14 @@ constexpr std::array kKeys = {
         Bounds{.min = 0.0, .max = 0.9}, "",
         "How far both damping ratios may be off, either way, as a share"},
 
-    Key{"second.x_freq_hz", &setting<&S::second, &N::x_freq_hz>, Bounds{.min = 0.0, .max = 1000.0},
+    Key{"second.x_freq_hz", &of_axis<&S::second, &N::freq_hz, 0>, Bounds{.min = 0.0, .max = 1000.0},
         "Hz",
         "What X still rings at once it is compensated; the base is shaped against it. 0: none"},
-    Key{"second.x_damping_ratio", &setting<&S::second, &N::x_damping_ratio>,
+    Key{"second.x_damping_ratio", &of_axis<&S::second, &N::damping_ratio, 0>,
         Bounds{.min = 0.0, .max = 0.5}, "", "Damping ratio of that mode"},
-    Key{"second.y_freq_hz", &setting<&S::second, &N::y_freq_hz>, Bounds{.min = 0.0, .max = 1000.0},
+    Key{"second.y_freq_hz", &of_axis<&S::second, &N::freq_hz, 1>, Bounds{.min = 0.0, .max = 1000.0},
         "Hz", "What Y still rings at, likewise"},
-    Key{"second.y_damping_ratio", &setting<&S::second, &N::y_damping_ratio>,
+    Key{"second.y_damping_ratio", &of_axis<&S::second, &N::damping_ratio, 1>,
         Bounds{.min = 0.0, .max = 0.5}, "", "Damping ratio of that mode"},
     Key{"second.shaper",
         &setting<&S::second, &N::shaper>,

@@ -98,9 +98,9 @@ Result<std::string> line_test(const Settings& settings) {
                 "is too low");
   }
   const Result<double> x_mm =
-      begin_of(settings.printer.travel_x_mm, kStroke_mm, "printer.travel_x_mm");
+      begin_of(settings.printer.travel_mm.x, kStroke_mm, "printer.travel_x_mm");
   const Result<double> y_mm =
-      begin_of(settings.printer.travel_y_mm, kRow_mm * static_cast<double>(kRates.size()),
+      begin_of(settings.printer.travel_mm.y, kRow_mm * static_cast<double>(kRates.size()),
                "printer.travel_y_mm");
   if (!x_mm || !y_mm) {
     return tl::unexpected(x_mm ? y_mm.error() : x_mm.error());

@@ -44,12 +44,11 @@ std::string origin_text(const std::optional<SourcePlace>& place) {
 
 // A key of one mode whose value is that of the largest of several.
 bool is_of_modes(const Draft& draft, std::string_view key) {
-  const auto is_of = [&](std::string_view section, const AxisDynamics& axis) {
-    return !axis.modes.empty() && key.starts_with(section) && !key.ends_with(kModes) &&
-           !key.ends_with(kPlants);
+  const auto is_of = [&](std::string_view axis, const AxisDynamics& dynamics) {
+    return !dynamics.modes.empty() && key.starts_with(fmt::format("dynamics.{}.", axis)) &&
+           !key.ends_with(kModes) && !key.ends_with(kPlants);
   };
-  return is_of("dynamics.x.", draft.settings.dynamics_x) ||
-         is_of("dynamics.y.", draft.settings.dynamics_y);
+  return any_axis(is_of, kAxisKeys, draft.settings.dynamics);
 }
 
 void record_origins(Draft& draft) {
@@ -106,28 +105,24 @@ Status read_printer(std::string_view text, const std::string& name, Draft& draft
   return read_toml(text, name, draft);
 }
 
-struct AxisFrequency {
-  std::string_view axis;
-  std::string_view key;
-  std::string_view key_of_modes;
-  AxisDynamics Settings::*dynamics;
-};
-
-constexpr std::array kFrequencies = {
-    AxisFrequency{"X", "dynamics.x.freq_hz", "dynamics.x.mode", &Settings::dynamics_x},
-    AxisFrequency{"Y", "dynamics.y.freq_hz", "dynamics.y.mode", &Settings::dynamics_y}};
+// "dynamics.x.freq_hz" for "x" and "freq_hz".
+std::string dynamics_key(std::string_view axis, std::string_view name) {
+  return fmt::format("dynamics.{}.{}", axis, name);
+}
 
 // A wrong resonance makes a print worse than it was sliced, so the default is for measuring alone.
 void note_unknown_resonances(Draft& draft) {
   std::vector<std::string_view> axes;
   std::vector<std::string> overrides;
-  for (const AxisFrequency& frequency : kFrequencies) {
-    if (!draft.places[*find_key(frequency.key)] &&
-        (draft.settings.*frequency.dynamics).modes.empty()) {
-      axes.push_back(frequency.axis);
-      overrides.push_back(fmt::format("--set {}=...", frequency.key));
-    }
-  }
+  for_each_axis(
+      [&](std::string_view letter, std::string_view axis, const AxisDynamics& dynamics) {
+        const std::string key = dynamics_key(axis, "freq_hz");
+        if (!draft.places[*find_key(key)] && dynamics.modes.empty()) {
+          axes.push_back(letter);
+          overrides.push_back(fmt::format("--set {}=...", key));
+        }
+      },
+      kAxisLetters, kAxisKeys, draft.settings.dynamics);
   if (axes.empty()) {
     return;
   }
@@ -144,11 +139,10 @@ void note_unknown_resonances(Draft& draft) {
 void note_odd_frequencies(Draft& draft) {
   constexpr double kLeast_hz = 10.0;
   constexpr double kMost_hz = 200.0;
-  for (const AxisFrequency& frequency : kFrequencies) {
-    const AxisDynamics& axis = draft.settings.*frequency.dynamics;
-    const std::string_view key = axis.modes.empty() ? frequency.key : frequency.key_of_modes;
+  const auto note = [&](std::string_view axis, const AxisDynamics& dynamics) {
+    const std::string key = dynamics_key(axis, dynamics.modes.empty() ? "freq_hz" : "mode");
     const std::optional<SourcePlace>& place = draft.places[*find_key(key)];
-    for (const double freq_hz : {axis.slowest_hz(), axis.fastest_hz()}) {
+    for (const double freq_hz : {dynamics.slowest_hz(), dynamics.fastest_hz()}) {
       if (place && (freq_hz < kLeast_hz || freq_hz > kMost_hz)) {
         draft.settings.notes.push_back(
             {*place,
@@ -158,22 +152,24 @@ void note_odd_frequencies(Draft& draft) {
         break;
       }
     }
-  }
+  };
+  for_each_axis(note, kAxisKeys, draft.settings.dynamics);
 }
 
 // A value of the user's own counts all the same.
 void note_odd_dampings(Draft& draft) {
-  for (const AxisFrequency& frequency : kFrequencies) {
-    const std::string key = std::string(section_of(frequency.key)) + ".damping_ratio";
+  const auto note = [&](std::string_view axis, const AxisDynamics& dynamics) {
+    const std::string key = dynamics_key(axis, "damping_ratio");
     const std::optional<SourcePlace>& place = draft.places[*find_key(key)];
-    const double ratio = (draft.settings.*frequency.dynamics).damping_ratio;
+    const double ratio = dynamics.damping_ratio;
     if (place && !is_plausible_damping(ratio)) {
       draft.settings.notes.push_back(
           {*place, fmt::format("{} is {:.4g}, but printers have {} to {}; measure it with unflex "
                                "identify or unflex tune",
                                key, ratio, kLeastDamping, kMostDamping)});
     }
-  }
+  };
+  for_each_axis(note, kAxisKeys, draft.settings.dynamics);
 }
 
 // Neither M503 nor a slicer tells which motors of a Marlin move what, and the limits of a run are

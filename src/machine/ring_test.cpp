@@ -44,9 +44,9 @@ std::optional<Around> around(Firmware firmware, char axis, double speed_mm_s) {
 Result<std::string> ring_test(const Settings& settings, char axis) {
   const bool is_x = axis == 'x';
   const Result<double> x_mm =
-      begin_of(settings.printer.travel_x_mm, is_x ? kStroke_mm : 0.0, "printer.travel_x_mm");
+      begin_of(settings.printer.travel_mm.x, is_x ? kStroke_mm : 0.0, "printer.travel_x_mm");
   const Result<double> y_mm =
-      begin_of(settings.printer.travel_y_mm, is_x ? 0.0 : kStroke_mm, "printer.travel_y_mm");
+      begin_of(settings.printer.travel_mm.y, is_x ? 0.0 : kStroke_mm, "printer.travel_y_mm");
   if (!x_mm || !y_mm) {
     return tl::unexpected(x_mm ? y_mm.error() : x_mm.error());
   }

@@ -10,11 +10,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numbers>
 
 #include "unflex/core/firmware_spec.hpp"
 #include "unflex/core/math.hpp"
+#include "unflex/core/xy.hpp"
 #include "unflex/machine/machine.hpp"
 #include "validate.hpp"
 #include "variants.hpp"
@@ -191,14 +193,15 @@ double Settings::most_of_motor() const {
 }
 
 double Settings::motor_max_velocity_mm_s() const {
-  const auto [x, y, z, e] = axis_max_velocity_mm_s();
-  return spec().motion.has_axis_limits ? std::min(x, y)
-                                       : most_of_motor() * limits.max_velocity_mm_s;
+  return spec().motion.has_axis_limits
+             ? least_of_axes(std::identity{}, xy_of(axis_max_velocity_mm_s()))
+             : most_of_motor() * limits.max_velocity_mm_s;
 }
 
 double Settings::motor_max_accel_mm_s2() const {
-  const auto [x, y, z, e] = axis_max_accel_mm_s2();
-  return spec().motion.has_axis_limits ? std::min(x, y) : most_of_motor() * limits.max_accel_mm_s2;
+  return spec().motion.has_axis_limits
+             ? least_of_axes(std::identity{}, xy_of(axis_max_accel_mm_s2()))
+             : most_of_motor() * limits.max_accel_mm_s2;
 }
 
 std::string_view Settings::motor_max_accel_key() const {
@@ -291,7 +294,7 @@ double Settings::tail_s() const {
   if (solve.tail_ms) {
     return *solve.tail_ms * 1e-3;
   }
-  return std::max({shortest_s, settling_time_s(dynamics_x), settling_time_s(dynamics_y)});
+  return std::max(shortest_s, most_of_axes(settling_time_s, dynamics));
 }
 
 double Settings::freq_error() const {
@@ -300,8 +303,8 @@ double Settings::freq_error() const {
 }
 
 bool Settings::has_several_models() const {
-  return !dynamics_x.plants.empty() || !dynamics_y.plants.empty() || freq_error() > 0.0 ||
-         dynamics_error.damping > 0.0;
+  return any_axis([](const AxisDynamics& axis) { return !axis.plants.empty(); }, dynamics) ||
+         freq_error() > 0.0 || dynamics_error.damping > 0.0;
 }
 
 std::vector<std::string_view> TimingSettings::feature_words() const {
@@ -365,7 +368,7 @@ double Settings::emit_accel_mm_s2(double asked_mm_s2) const {
 }
 
 double Settings::good_period_ms() const {
-  return std::min(dynamics_x.good_period_ms(), dynamics_y.good_period_ms());
+  return least_of_axes([](const AxisDynamics& axis) { return axis.good_period_ms(); }, dynamics);
 }
 
 double Settings::period_ms() const {
@@ -375,42 +378,42 @@ double Settings::period_ms() const {
 
 double Settings::tolerance_um() const {
   constexpr double kPerHz = 0.25 / 45.0;
-  return emit.tolerance_um.value_or(kPerHz * std::min(dynamics_x.freq_hz, dynamics_y.freq_hz));
+  return emit.tolerance_um.value_or(
+      kPerHz * least_of_axes([](const AxisDynamics& axis) { return axis.freq_hz; }, dynamics));
 }
 
-std::string Settings::shaper_type_x() const {
-  return printer.input_shaper_type == "auto" ? std::string(spec().filters.shaper_type)
-                                             : printer.input_shaper_type;
+Axes<std::string> Settings::shaper_type() const {
+  Axes<std::string> type = printer.input_shaper_type;
+  type.x = type.x == "auto" ? std::string(spec().filters.shaper_type) : type.x;
+  type.y = type.y == "auto" ? type.x : type.y;
+  return type;
 }
 
-std::string Settings::shaper_type_y() const {
-  return printer.input_shaper_type_y == "auto" ? shaper_type_x() : printer.input_shaper_type_y;
+Axes<double> Settings::shaper_damping_ratio() const {
+  return map_axes(
+      [&](const std::optional<double>& told) {
+        return told.value_or(spec().filters.shaper_damping_ratio);
+      },
+      printer.input_shaper_damping_ratio);
 }
 
-double Settings::shaper_damping_ratio_x() const {
-  return printer.input_shaper_damping_ratio_x.value_or(spec().filters.shaper_damping_ratio);
-}
-
-double Settings::shaper_damping_ratio_y() const {
-  return printer.input_shaper_damping_ratio_y.value_or(spec().filters.shaper_damping_ratio);
-}
-
-double Settings::shaper_freq_x_hz() const { return printer.input_shaper_freq_x_hz.value_or(0.0); }
-
-double Settings::shaper_freq_y_hz() const {
-  return printer.input_shaper_freq_y_hz.value_or(
-      spec().filters.shapes_both_axes_alike ? shaper_freq_x_hz() : 0.0);
+// One shaper may be for both axes.
+Axes<double> Settings::shaper_freq_hz() const {
+  const double x_hz = printer.input_shaper_freq_hz.x.value_or(0.0);
+  return {x_hz, printer.input_shaper_freq_hz.y.value_or(
+                    spec().filters.shapes_both_axes_alike ? x_hz : 0.0)};
 }
 
 // Any printer may have a shaper. On the Snapmaker J1 the command that switches it off does harm
 // (variants.cpp), so there only one that is told of is taken for there.
-bool Settings::shaper_unknown_x() const {
-  return !printer.input_shaper_freq_x_hz && printer.variant != "snapmaker_j1";
-}
-
-bool Settings::shaper_unknown_y() const {
-  const bool is_as_x = spec().filters.shapes_both_axes_alike && printer.input_shaper_freq_x_hz;
-  return !printer.input_shaper_freq_y_hz && !is_as_x && printer.variant != "snapmaker_j1";
+Axes<bool> Settings::shaper_unknown() const {
+  Axes<bool> unknown = map_axes(
+      [&](const std::optional<double>& told) { return !told && printer.variant != "snapmaker_j1"; },
+      printer.input_shaper_freq_hz);
+  if (spec().filters.shapes_both_axes_alike) {
+    unknown.y = unknown.y && unknown.x;
+  }
+  return unknown;
 }
 
 }  // namespace unflex::machine

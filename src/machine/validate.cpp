@@ -21,6 +21,20 @@
 namespace unflex::machine {
 namespace {
 
+// The first failure of check(v, …), which is asked for each axis in turn.
+template <typename Check, typename... Values>
+Status each_in_turn(Check&& check, Values&&... values) {
+  Status first;
+  for_each_axis(
+      [&](auto&&... value) {
+        if (first) {
+          first = check(value...);
+        }
+      },
+      values...);
+  return first;
+}
+
 // A firmware needs some room above the base's acceleration to follow dense lines.
 // With fewer nodes per period of resonance, the optimum is worse than a ZV shaper's.
 constexpr double kLeastNodesPerPeriod = 10.0;
@@ -226,13 +240,13 @@ Status check_shaper(const Draft& draft) {
   if (!s.spec().filters.shapes_both_axes_alike) {
     return {};
   }
-  const double freq_hz = s.shaper_freq_x_hz();
-  if (freq_hz != s.shaper_freq_y_hz()) {
+  const double freq_hz = s.shaper_freq_hz().x;
+  if (freq_hz != s.shaper_freq_hz().y) {
     return conflict(draft, {"printer.input_shaper_freq_y_hz"},
                     fmt::format("printer.input_shaper_freq_y_hz is {}, but RepRapFirmware has one "
                                 "input shaper for both axes; set "
                                 "printer.input_shaper_freq_x_hz, now {}, alone",
-                                s.shaper_freq_y_hz(), freq_hz));
+                                s.shaper_freq_hz().y, freq_hz));
   }
   // Half a period has to be a 16 bit number of step clocks.
   const double least_hz = s.printer.step_clock_hz / (2.0 * 65535.0);
@@ -336,12 +350,12 @@ Status check_emission(const Draft& draft) {
 Status check_second(const Draft& draft) {
   constexpr double kNear = 0.05;
   const Settings& s = draft.settings;
-  const auto check = [&](const AxisDynamics& axis, const std::string& name,
+  const auto check = [&](const AxisDynamics& axis, std::string_view name,
                          double second_hz) -> Status {
     if (second_hz == 0.0) {
       return {};
     }
-    const std::string key = "second." + name + "_freq_hz";
+    const std::string key = fmt::format("second.{}_freq_hz", name);
     std::vector<double> known_hz = {axis.freq_hz};
     std::size_t most = axis.modes.size();
     const auto add = [&](const std::vector<ModeSettings>& modes) {
@@ -370,10 +384,7 @@ Status check_second(const Draft& draft) {
     }
     return {};
   };
-  if (Status x = check(s.dynamics_x, "x", s.second.x_freq_hz); !x) {
-    return x;
-  }
-  return check(s.dynamics_y, "y", s.second.y_freq_hz);
+  return each_in_turn(check, s.dynamics, kAxisKeys, s.second.freq_hz);
 }
 
 Status check_timing(const Draft& draft) {
@@ -392,7 +403,8 @@ Status check_timing(const Draft& draft) {
 }
 
 double fastest_freq_hz(const Settings& settings) {
-  return std::max(settings.dynamics_x.fastest_hz(), settings.dynamics_y.fastest_hz());
+  return most_of_axes([](const AxisDynamics& axis) { return axis.fastest_hz(); },
+                      settings.dynamics);
 }
 
 Status check_grid(const Draft& draft) {
@@ -415,10 +427,11 @@ Status check_grid(const Draft& draft) {
 }  // namespace
 
 Status resolve_dynamics(Draft& draft) {
-  if (Status x = resolve_axis(draft, "dynamics.x", draft.mass_x, draft.settings.dynamics_x); !x) {
-    return x;
-  }
-  return resolve_axis(draft, "dynamics.y", draft.mass_y, draft.settings.dynamics_y);
+  const auto resolve = [&](std::string_view axis, const MassSpringDamper& mass,
+                           AxisDynamics& dynamics) {
+    return resolve_axis(draft, fmt::format("dynamics.{}", axis), mass, dynamics);
+  };
+  return each_in_turn(resolve, kAxisKeys, draft.mass, draft.settings.dynamics);
 }
 
 Status check_consistency(const Draft& draft) {

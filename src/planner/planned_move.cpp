@@ -106,17 +106,14 @@ double PlannedMove::time_s(double distance_mm) const {
 }
 
 double asked_accel_mm_s2(const PlannedMove& move) {
-  const double share =
-      std::max(std::abs(move.direction[gcode::X]), std::abs(move.direction[gcode::Y]));
+  const double share = largest_part(xy_of(move.direction));
   return move.accel_s + move.decel_s > 0.0 ? share * move.accel_mm_s2 : 0.0;
 }
 
 bool turns_sharply(const gcode::Position& before, const gcode::Position& after) {
   constexpr double kCosine = 0.9397;
-  const double lengths = math::hypot(before[gcode::X], before[gcode::Y]) *
-                         math::hypot(after[gcode::X], after[gcode::Y]);
-  return before[gcode::X] * after[gcode::X] + before[gcode::Y] * after[gcode::Y] <
-         kCosine * lengths;
+  const double lengths = length(xy_of(before)) * length(xy_of(after));
+  return dot(xy_of(before), xy_of(after)) < kCosine * lengths;
 }
 
 }  // namespace unflex::planner

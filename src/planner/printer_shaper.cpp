@@ -77,25 +77,36 @@ bool same(const gcode::Shaper& a, const gcode::Shaper& b) {
   if (!a.is_on() && !b.is_on()) {
     return true;
   }
-  return a.freq_x_hz == b.freq_x_hz && a.freq_y_hz == b.freq_y_hz && a.settings == b.settings;
+  return a.freq_hz == b.freq_hz && a.settings == b.settings;
 }
 
 }  // namespace
 
-double Shaping::lead_s() const { return std::max(planner::lead_s(x), planner::lead_s(y)); }
+double Shaping::lead_s() const {
+  return most_of_axes([](const ShaperPulses& of) { return planner::lead_s(of); }, *this);
+}
 
-double Shaping::reach_s() const { return std::max(planner::reach_s(x), planner::reach_s(y)); }
+double Shaping::reach_s() const {
+  return most_of_axes([](const ShaperPulses& of) { return planner::reach_s(of); }, *this);
+}
 
-double Shaping::length_s() const { return std::max(planner::length_s(x), planner::length_s(y)); }
+double Shaping::length_s() const {
+  return most_of_axes([](const ShaperPulses& of) { return planner::length_s(of); }, *this);
+}
 
 Shaping shaping(const FirmwareConfig& config, const gcode::Shaper& shaper) {
   const gcode::ShaperSettings& set = shaper.settings;
   const InstalledShaper& installed = config.shaper;
-  return {
-      pulses(config.firmware, shaper.freq_x_hz, set.type_x.empty() ? installed.type_x : set.type_x,
-             set.damping_ratio_x.value_or(installed.damping_ratio_x)),
-      pulses(config.firmware, shaper.freq_y_hz, set.type_y.empty() ? installed.type_y : set.type_y,
-             set.damping_ratio_y.value_or(installed.damping_ratio_y))};
+  const Axes<std::string> type =
+      map_axes([](const std::string& told,
+                  const std::string& built_in) { return told.empty() ? built_in : told; },
+               set.type, installed.type);
+  return {map_axes(
+      [&](double freq_hz, const std::string& of_axis, const std::optional<double>& told,
+          double built_in) {
+        return pulses(config.firmware, freq_hz, of_axis, told.value_or(built_in));
+      },
+      shaper.freq_hz, type, set.damping_ratio, installed.damping_ratio)};
 }
 
 FirmwareAdvance advance_in_force(const FirmwareConfig& config,

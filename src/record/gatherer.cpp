@@ -31,7 +31,8 @@ constexpr double kAtPlace = 0.05;
 constexpr std::size_t kNoPiece = std::numeric_limits<std::size_t>::max();
 
 double half_width_s(const verify::NozzleModel& model) {
-  const double slower = std::min(model.x.slowest_rad_s(), model.y.slowest_rad_s());
+  const double slower =
+      least_of_axes([](const dynamics::FlexibleAxis& axis) { return axis.slowest_rad_s(); }, model);
   return std::clamp(kPeriods * 2.0 * std::numbers::pi / slower, kShortest_s, kLongest_s);
 }
 
@@ -119,8 +120,7 @@ void Recorder::Gatherer::step(verify::NozzleId nozzle, const verify::NozzleStep&
 }
 
 void Recorder::Gatherer::move_along(Version& version, const verify::NozzleStep& step) const {
-  const double along_mm =
-      cells_[version.where.move].along_mm(step.reference_x_mm, step.reference_y_mm);
+  const double along_mm = cells_[version.where.move].along_mm(step.reference_mm);
   version.where.along_mm = std::max(version.where.along_mm, along_mm);
 }
 
@@ -131,8 +131,7 @@ void Recorder::Gatherer::lay(int number, const verify::NozzleStep& step) {
   chunk.sum_contour2 += step.h_s * step.mean_contour2_mm2;
   if (step.largest_contour2_mm2 > chunk.contour2_max_mm2) {
     chunk.contour2_max_mm2 = step.largest_contour2_mm2;
-    chunk.max_x_mm = step.measured ? step.reference_x_mm : step.nozzle.x.position;
-    chunk.max_y_mm = step.measured ? step.reference_y_mm : step.nozzle.y.position;
+    chunk.max_at_mm = step.measured ? step.reference_mm : dynamics::place_mm(step.nozzle);
     chunk.max_line = step.line;
   }
   if (step.measured && chunk.weight_s >= kChunk_s) {
@@ -217,11 +216,14 @@ void Recorder::Gatherer::close_chunk(int number, double to_mm) {
   feature_sums_[laid.feature][number].add(chunk);
 
   if (chunk.contour2_max_mm2 > version.block.contour2_mm2) {
-    const double along_mm = move.along_mm(chunk.max_x_mm, chunk.max_y_mm);
-    version.block = {chunk.contour2_max_mm2, {version.where.move, along_mm},
-                     chunk.max_line,         laid.layer,
-                     laid.feature,           chunk.max_x_mm,
-                     chunk.max_y_mm,         laid.z_mm};
+    const double along_mm = move.along_mm(chunk.max_at_mm);
+    version.block = {chunk.contour2_max_mm2,
+                     {version.where.move, along_mm},
+                     chunk.max_line,
+                     laid.layer,
+                     laid.feature,
+                     chunk.max_at_mm,
+                     laid.z_mm};
   }
   version.block_s += chunk.weight_s;
   if (version.block_s >= kBlock_s) {
@@ -274,9 +276,8 @@ void Recorder::Gatherer::complete_moves(std::size_t until) {
       const double from_mm = place(i);
       const double to_mm = place(i + 1);
       const std::array<unsigned char, 2> codes = cells_.cell(move, i);
-      store_.add({move.layer, move.feature, move.line, move.x_mm + from_mm * move.direction_x,
-                  move.y_mm + from_mm * move.direction_y, move.x_mm + to_mm * move.direction_x,
-                  move.y_mm + to_mm * move.direction_y, codes[0], codes[1]});
+      store_.add({move.layer, move.feature, move.line, move.start_mm + from_mm * move.direction,
+                  move.start_mm + to_mm * move.direction, codes[0], codes[1]});
     }
     cells_.drop_front();
   }
@@ -300,8 +301,7 @@ std::vector<report::Place> Recorder::Gatherer::places(int number) const {
     place.line = candidate.line;
     place.layer = candidate.layer;
     place.feature = candidate.feature;
-    place.x_mm = candidate.x_mm;
-    place.y_mm = candidate.y_mm;
+    place.xy_mm = candidate.xy_mm;
     place.z_mm = candidate.z_mm;
     for (const Scene& scene : scenes_) {
       if (scene.id == kept.id) {
@@ -322,12 +322,9 @@ std::vector<report::Place> Recorder::Gatherer::places(int number) const {
     (number == 0 ? place.before_mm : place.after_mm) = std::sqrt(candidate.contour2_mm2);
     for (std::vector<report::Moment>* moments : {&place.before, &place.after}) {
       for (report::Moment& moment : *moments) {
-        moment.reference_x_mm -= place.x_mm;
-        moment.reference_y_mm -= place.y_mm;
-        moment.base_x_mm -= place.x_mm;
-        moment.base_y_mm -= place.y_mm;
-        moment.nozzle_x_mm -= place.x_mm;
-        moment.nozzle_y_mm -= place.y_mm;
+        moment.reference_mm -= place.xy_mm;
+        moment.base_mm -= place.xy_mm;
+        moment.nozzle_mm -= place.xy_mm;
       }
     }
     result.push_back(std::move(place));

@@ -13,6 +13,7 @@
 #include "moment_ring.hpp"
 #include "path_cells.hpp"
 #include "shaper_bench.hpp"
+#include "unflex/core/xy.hpp"
 #include "unflex/record/recorder.hpp"
 #include "unflex/verify/log_histogram.hpp"
 #include "worst_places.hpp"
@@ -41,7 +42,7 @@ class Recorder::Gatherer final : public verify::Observer {
     double weight_s = 0.0;
     double sum_contour2 = 0.0;
     double contour2_max_mm2 = -1.0;
-    double max_x_mm = 0.0, max_y_mm = 0.0;  // where the reference was at the largest deviation
+    XY max_at_mm;  // where the reference was at the largest deviation
     std::size_t max_line = 0;
   };
   // What belongs to a move that lays filament. Some may come out behind its end, in travel.

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "unflex/core/math.hpp"
-
 namespace unflex::record {
 namespace {
 
@@ -52,12 +50,12 @@ void LayerStore::add(const Stretch& stretch) {
   if (stretch.layer % layer_step_ != 0) {
     return;
   }
-  const Point start{units(stretch.x0_mm), units(stretch.y0_mm)};
+  const Point start{map_axes(units, stretch.from_mm)};
   if (!continues(stretch, start)) {
     begin_path({points_.size(), stretch.layer, stretch.feature, stretch.line, stretch.line}, start);
   }
   paths_.back().last_line = stretch.line;
-  extend({units(stretch.x1_mm), units(stretch.y1_mm), stretch.before, stretch.after});
+  extend({map_axes(units, stretch.to_mm), stretch.before, stretch.after});
   while (size_bytes() > budget_bytes_) {
     do {
       coarsen();
@@ -71,8 +69,7 @@ bool LayerStore::continues(const Stretch& stretch, const Point& start) const {
   }
   const Path& path = paths_.back();
   const Point& last = points_.back();
-  return path.layer == stretch.layer && path.feature == stretch.feature && last.x == start.x &&
-         last.y == start.y;
+  return path.layer == stretch.layer && path.feature == stretch.feature && last.at == start.at;
 }
 
 void LayerStore::begin_path(const Path& head, const Point& start) {
@@ -84,7 +81,7 @@ void LayerStore::begin_path(const Path& head, const Point& start) {
 void LayerStore::extend(const Point& point) {
   Point& last = points_.back();
   const bool at_start = points_.size() - 1 == paths_.back().begin;
-  if (last.x == point.x && last.y == point.y) {
+  if (last.at == point.at) {
     if (!at_start) {
       last.before = std::max(last.before, point.before);
       last.after = std::max(last.after, point.after);
@@ -98,7 +95,7 @@ void LayerStore::extend(const Point& point) {
     left_out_.push_back(last);
     widen(codes_[0], point.before);
     widen(codes_[1], point.after);
-    last = {point.x, point.y, codes_[0].most, codes_[1].most};
+    last = {point.at, codes_[0].most, codes_[1].most};
     return;
   }
   points_.push_back(point);
@@ -115,22 +112,24 @@ bool LayerStore::merges(const Point& point) const {
     const int most = std::max(kSmall, std::max(range.most, code));
     return most - least <= kAlike + kAlikePerLevel * level_;
   };
-  if (math::hypot(point.x - from.x, point.y - from.y) > least_ &&
+  if (length(way(from, point)) > least_ &&
       !(alike(codes_[0], point.before) && alike(codes_[1], point.after))) {
     return false;
   }
   return left_out_.size() < kMostLeftOut && near_chord(from, point);
 }
 
+XY LayerStore::way(const Point& from, const Point& to) {
+  return map_axes([](std::int32_t units) { return static_cast<double>(units); }, to.at - from.at);
+}
+
 bool LayerStore::near_chord(const Point& from, const Point& to) const {
-  const double x = to.x - from.x;
-  const double y = to.y - from.y;
-  const double length2 = std::max(x * x + y * y, 1.0);
+  const XY chord = way(from, to);
+  const double length2 = std::max(squared(chord), 1.0);
   const auto is_near = [&](const Point& point) {
-    const double to_x = point.x - from.x;
-    const double to_y = point.y - from.y;
-    const double along = std::clamp((to_x * x + to_y * y) / length2, 0.0, 1.0);
-    return math::hypot(to_x - along * x, to_y - along * y) <= tolerance_;
+    const XY off = way(from, point);
+    const double along = std::clamp(dot(off, chord) / length2, 0.0, 1.0);
+    return length(off - along * chord) <= tolerance_;
   };
   return is_near(points_.back()) && std::all_of(left_out_.begin(), left_out_.end(), is_near);
 }
@@ -146,7 +145,7 @@ std::size_t LayerStore::size_bytes() const {
 // Whether the path is so small that nobody would miss it.
 bool LayerStore::too_small(std::span<const Point> path) const {
   return tolerance_ > kCoarsest && std::all_of(path.begin(), path.end(), [&](const Point& point) {
-           return math::hypot(point.x - path[0].x, point.y - path[0].y) <= tolerance_;
+           return length(way(path[0], point)) <= tolerance_;
          });
 }
 
@@ -175,18 +174,18 @@ void LayerStore::coarsen() {
   may_merge_ = false;
 }
 
-std::array<double, 2> LayerStore::extent(std::int32_t Point::*coordinate) const {
-  // Coordinates with path lengths: half of each stretch at each of its ends.
+std::array<double, 2> LayerStore::extent(std::size_t axis) const {
+  // Places on the axis with path lengths: half of each stretch at each of its ends.
   std::vector<std::pair<std::int32_t, double>> lengths;
   double whole = 0.0;
   for (std::size_t path = 0; path < paths_.size(); ++path) {
     for (std::size_t i = paths_[path].begin + 1; i < end_of(path); ++i) {
       const Point& from = points_[i - 1];
       const Point& to = points_[i];
-      const double length = math::hypot(to.x - from.x, to.y - from.y);
-      lengths.emplace_back(from.*coordinate, 0.5 * length);
-      lengths.emplace_back(to.*coordinate, 0.5 * length);
-      whole += length;
+      const double way_length = length(way(from, to));
+      lengths.emplace_back(from.at[axis], 0.5 * way_length);
+      lengths.emplace_back(to.at[axis], 0.5 * way_length);
+      whole += way_length;
     }
   }
   if (lengths.empty()) {
@@ -212,8 +211,9 @@ void LayerStore::encode_into(std::size_t layers, std::vector<std::size_t>& ends,
   Point last;
   std::size_t last_line = 0;
   const auto put_place = [&](const Point& point) {
-    put_signed(std::int64_t{point.x} - last.x, bytes);
-    put_signed(std::int64_t{point.y} - last.y, bytes);
+    for_each_axis(
+        [&](std::int32_t to, std::int32_t from) { put_signed(std::int64_t{to} - from, bytes); },
+        point.at, last.at);
     last = point;
   };
   for (std::size_t path = 0; path < paths_.size(); ++path) {
@@ -249,12 +249,11 @@ report::LayerPaths LayerStore::encode(std::size_t layers, std::vector<std::size_
     encode_into(layers, ends, result.bytes);
   }
   result.layer_step = layer_step_;
-  const std::array<double, 2> x = extent(&Point::x);
-  const std::array<double, 2> y = extent(&Point::y);
-  result.x_min_mm = x[0] / kUnitsPerMm;
-  result.x_max_mm = x[1] / kUnitsPerMm;
-  result.y_min_mm = y[0] / kUnitsPerMm;
-  result.y_max_mm = y[1] / kUnitsPerMm;
+  for (std::size_t axis = 0; axis < XY::kCount; ++axis) {
+    const auto [least, most] = extent(axis);
+    result.min_mm[axis] = least / kUnitsPerMm;
+    result.max_mm[axis] = most / kUnitsPerMm;
+  }
   result.tolerance_mm = tolerance_ / kUnitsPerMm;
   return result;
 }

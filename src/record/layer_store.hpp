@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "unflex/core/xy.hpp"
 #include "unflex/report/recording.hpp"
 
 namespace unflex::record {
@@ -21,7 +22,7 @@ struct Stretch {
   std::size_t layer = 0;
   std::size_t feature = 0;
   std::size_t line = 0;
-  double x0_mm = 0.0, y0_mm = 0.0, x1_mm = 0.0, y1_mm = 0.0;
+  XY from_mm, to_mm;
   unsigned char before = 0, after = 0;
 };
 
@@ -39,7 +40,7 @@ class LayerStore {
 
  private:
   struct Point {
-    std::int32_t x = 0, y = 0;  // 0.01 mm
+    Axes<std::int32_t> at;  // 0.01 mm
     unsigned char before = 0, after = 0;
   };
   struct Path {
@@ -55,13 +56,14 @@ class LayerStore {
   void begin_path(const Path& head, const Point& start);
   void extend(const Point& point);
   [[nodiscard]] bool merges(const Point& point) const;
+  [[nodiscard]] static XY way(const Point& from, const Point& to);  // 0.01 mm
   [[nodiscard]] bool near_chord(const Point& from, const Point& to) const;
   [[nodiscard]] bool continues(const Stretch& stretch, const Point& start) const;
   [[nodiscard]] std::size_t end_of(std::size_t path) const;
   [[nodiscard]] bool too_small(std::span<const Point> path) const;
   void coarsen();
-  // Range of the coordinate in which all but a few thousandths of the paths' length lies, 0.01 mm.
-  [[nodiscard]] std::array<double, 2> extent(std::int32_t Point::*coordinate) const;
+  // Range of the axis in which all but a few thousandths of the paths' length lies, 0.01 mm.
+  [[nodiscard]] std::array<double, 2> extent(std::size_t axis) const;
   void encode_into(std::size_t layers, std::vector<std::size_t>& ends, std::string& bytes) const;
 
   std::size_t budget_bytes_;

@@ -22,12 +22,9 @@ void MomentRing::add(const verify::NozzleStep& step, const PathPoint& where) {
   report::Moment& moment = entry.moment;
   moment.time_s = clock_s_;
   moment.contour_mm = std::sqrt(step.contour2_mm2);
-  moment.reference_x_mm = step.measured ? step.reference_x_mm : step.base_x.position;
-  moment.reference_y_mm = step.measured ? step.reference_y_mm : step.base_y.position;
-  moment.base_x_mm = step.base_x.position;
-  moment.base_y_mm = step.base_y.position;
-  moment.nozzle_x_mm = step.nozzle.x.position;
-  moment.nozzle_y_mm = step.nozzle.y.position;
+  moment.base_mm = dynamics::place_mm(step.base);
+  moment.reference_mm = step.measured ? step.reference_mm : moment.base_mm;
+  moment.nozzle_mm = dynamics::place_mm(step.nozzle);
 }
 
 void MomentRing::cancel(std::size_t id) {

@@ -17,11 +17,9 @@ void PathCells::append(const verify::PathPiece& piece, std::size_t layer, std::s
   move.line = piece.move.segment.line;
   move.layer = layer;
   move.feature = feature;
-  move.x_mm = piece.x_mm;
-  move.y_mm = piece.y_mm;
+  move.start_mm = piece.start_mm;
   move.z_mm = piece.move.segment.end_mm[gcode::Z];
-  move.direction_x = piece.direction_x;
-  move.direction_y = piece.direction_y;
+  move.direction = piece.direction;
   move.length_mm = piece.length_xy_mm;
   move.first_cell = first_cell_ + cells_.size();
   if (move.extruding) {

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <deque>
 
+#include "unflex/core/xy.hpp"
 #include "unflex/verify/reference_path.hpp"
 
 namespace unflex::record {
@@ -15,15 +16,16 @@ struct PathMove {
   std::size_t line = 0;
   std::size_t layer = 0;
   std::size_t feature = 0;
-  double x_mm = 0.0, y_mm = 0.0, z_mm = 0.0;  // start, z: end
-  double direction_x = 0.0, direction_y = 0.0;
+  XY start_mm;
+  double z_mm = 0.0;  // at the end
+  XY direction;
   double length_mm = 0.0;
   std::size_t first_cell = 0;
   std::size_t cells = 0;
 
   // How far along the move a point is.
-  [[nodiscard]] double along_mm(double x, double y) const {
-    return (x - x_mm) * direction_x + (y - y_mm) * direction_y;
+  [[nodiscard]] double along_mm(const XY& place_mm) const {
+    return dot(place_mm - start_mm, direction);
   }
 };
 

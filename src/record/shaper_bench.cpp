@@ -59,8 +59,9 @@ dynamics::ShaperPulses earlier(const dynamics::ShaperPulses& pulses, double shif
 // Some firmwares delay the whole motion. What the axes have of that in common only makes the print
 // late. It is taken away, because the bench looks for the nozzle near where the plan is.
 PrinterShaper without_common_delay(const PrinterShaper& shaper) {
-  const double shift_s = 0.5 * (mean_delay_s(shaper.x) + mean_delay_s(shaper.y));
-  return {shaper.name, earlier(shaper.x, shift_s), earlier(shaper.y, shift_s)};
+  const double shift_s = 0.5 * sum_of_axes(mean_delay_s, shaper.pulses);
+  return {shaper.name,
+          map_axes([&](const auto& of_axis) { return earlier(of_axis, shift_s); }, shaper.pulses)};
 }
 
 }  // namespace
@@ -68,8 +69,11 @@ PrinterShaper without_common_delay(const PrinterShaper& shaper) {
 ShaperBench::ShaperBench(const verify::NozzleModel& model,
                          std::span<const dynamics::ShaperKind> kinds,
                          const std::optional<PrinterShaper>& printer_shaper, std::size_t machines)
-    : interval_s_(std::clamp(1.0 / (kPerPeriod * std::max(model.x.main_hz(), model.y.main_hz())),
-                             5e-4, 2e-3)),
+    : interval_s_(std::clamp(
+          1.0 / (kPerPeriod *
+                 most_of_axes([](const dynamics::FlexibleAxis& axis) { return axis.main_hz(); },
+                              model)),
+          5e-4, 2e-3)),
       last_add_s_(machines, -1.0),
       last_(machines),
       near_(verify::reach_s(model)) {
@@ -78,10 +82,13 @@ ShaperBench::ShaperBench(const verify::NozzleModel& model,
                   is_drawn(kind),
                   {},
                   verify::CornerGauge(verify::reach_s(model))};
-    const auto x = dynamics::shaper_pulses(kind, model.x.main_hz(), model.x.main_damping_ratio());
-    const auto y = dynamics::shaper_pulses(kind, model.y.main_hz(), model.y.main_damping_ratio());
-    if (x && y) {
-      install(shaper, *x, *y, machines);
+    const auto pulses = map_axes(
+        [&](const dynamics::FlexibleAxis& axis) {
+          return dynamics::shaper_pulses(kind, axis.main_hz(), axis.main_damping_ratio());
+        },
+        model);
+    if (all_axes([](const auto& of_axis) { return of_axis.has_value(); }, pulses)) {
+      install(shaper, map_axes([](const auto& of_axis) { return *of_axis; }, pulses), machines);
     }
     shapers_.push_back(std::move(shaper));
   }
@@ -89,14 +96,14 @@ ShaperBench::ShaperBench(const verify::NozzleModel& model,
     const PrinterShaper own = without_common_delay(*printer_shaper);
     Shaper shaper{own.name, true, {}, verify::CornerGauge(verify::reach_s(model))};
     shaper.printers_own = true;
-    install(shaper, own.x, own.y, machines);
+    install(shaper, own.pulses, machines);
     shapers_.push_back(std::move(shaper));
   }
 }
 
-void ShaperBench::install(Shaper& shaper, const dynamics::ShaperPulses& x,
-                          const dynamics::ShaperPulses& y, std::size_t machines) {
-  shaper.nozzles.assign(machines, Nozzle{rivals::ShapedNozzle(x, y)});
+void ShaperBench::install(Shaper& shaper, const Axes<dynamics::ShaperPulses>& pulses,
+                          std::size_t machines) {
+  shaper.nozzles.assign(machines, Nozzle{rivals::ShapedNozzle(pulses)});
   lookahead_s_ = std::max(lookahead_s_, shaper.nozzles.front().shaped.lookahead_s());
 }
 
@@ -114,12 +121,18 @@ void ShaperBench::add(std::size_t machine, double time_s,
     }
   };
   const dynamics::NozzleMotionXY& last = last_[machine];
+  const auto was_steady = [&](const dynamics::NozzleMotion& from,
+                              const dynamics::NozzleMotion& to) {
+    return is_steady(from, to, time_s - last_s);
+  };
   if (last_s >= 0.0 && time_s - last_s > kGap * interval_s_ &&
-      !(is_steady(last.x, unshaped.x, time_s - last_s) &&
-        is_steady(last.y, unshaped.y, time_s - last_s))) {
+      !all_axes(was_steady, last, unshaped)) {
     // Two states at rest, so that no cubic spans the whole rest.
-    add(last_s + interval_s_, {{last.x.position, 0.0}, {last.y.position, 0.0}});
-    add(time_s - interval_s_, {{unshaped.x.position, 0.0}, {unshaped.y.position, 0.0}});
+    const auto at_rest = [](const dynamics::NozzleMotion& nozzle) {
+      return dynamics::NozzleMotion{nozzle.position, 0.0};
+    };
+    add(last_s + interval_s_, map_axes(at_rest, last));
+    add(time_s - interval_s_, map_axes(at_rest, unshaped));
   }
   add(time_s, unshaped);
   last_add_s_[machine] = time_s;
@@ -184,7 +197,7 @@ void ShaperBench::measure(const verify::ReferencePath& path, bool counts) {
   peaking_.clear();
   const auto squared_error = [&](const dynamics::NozzleMotionXY& state) {
     std::size_t nearest = 0;
-    return near_.squared_contour_error(path, state.x.position, state.y.position, nearest);
+    return near_.squared_contour_error(path, dynamics::place_mm(state), nearest);
   };
   for (Shaper& shaper : shapers_) {
     for (Nozzle& nozzle : shaper.nozzles) {
@@ -232,11 +245,13 @@ void ShaperBench::look_at_corners(Shaper& shaper, const dynamics::NozzleMotionXY
   const int parts = h < 1.5 * interval_s_ && shaper.corners.is_near(next_s_) ? kFine : 1;
   for (int part = 1; part < parts; ++part) {
     const double u = static_cast<double>(part) / kFine;
-    shaper.corners.sample(shaper.last_s + u * h,
-                          rivals::on_cubic(shaper.last.x, state.x, h, u).position,
-                          rivals::on_cubic(shaper.last.y, state.y, h, u).position);
+    const dynamics::NozzleMotionXY between =
+        map_axes([&](const dynamics::NozzleMotion& a,
+                     const dynamics::NozzleMotion& b) { return rivals::on_cubic(a, b, h, u); },
+                 shaper.last, state);
+    shaper.corners.sample(shaper.last_s + u * h, dynamics::place_mm(between));
   }
-  shaper.corners.sample(next_s_, state.x.position, state.y.position);
+  shaper.corners.sample(next_s_, dynamics::place_mm(state));
   shaper.last_s = next_s_;
   shaper.last = state;
 }

@@ -56,8 +56,7 @@ class ShaperBench {
     bool printers_own = false;
   };
 
-  void install(Shaper& shaper, const dynamics::ShaperPulses& x, const dynamics::ShaperPulses& y,
-               std::size_t machines);
+  void install(Shaper& shaper, const Axes<dynamics::ShaperPulses>& pulses, std::size_t machines);
   void measure(const verify::ReferencePath& path, bool counts);
   // The nozzle's way to where it is now.
   void look_at_corners(Shaper& shaper, const dynamics::NozzleMotionXY& state) const;

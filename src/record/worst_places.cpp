@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "unflex/core/math.hpp"
-
 namespace unflex::record {
 namespace {
 
@@ -18,8 +16,7 @@ WorstPlaces::Change WorstPlaces::add(const PlaceCandidate& candidate, std::size_
     return change;
   }
   const auto is_near = [&](const Kept& kept) {
-    return math::hypot(kept.candidate.x_mm - candidate.x_mm, kept.candidate.y_mm - candidate.y_mm) <
-           kSamePlace_mm;
+    return distance(candidate.xy_mm, kept.candidate.xy_mm) < kSamePlace_mm;
   };
   const bool known = std::any_of(places_.begin(), places_.end(), [&](const Kept& kept) {
     return is_near(kept) && kept.candidate.contour2_mm2 >= candidate.contour2_mm2;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "moment_ring.hpp"
+#include "unflex/core/xy.hpp"
 #include "unflex/report/recording.hpp"
 
 namespace unflex::record {
@@ -16,7 +17,8 @@ struct PlaceCandidate {
   std::size_t line = 0;
   std::size_t layer = 0;
   std::size_t feature = 0;
-  double x_mm = 0.0, y_mm = 0.0, z_mm = 0.0;
+  XY xy_mm;
+  double z_mm = 0.0;
 };
 
 class WorstPlaces {

@@ -192,7 +192,7 @@ std::string place_text(const Recording& recording, const Place& place) {
       !recording.features[place.feature].name.empty()) {
     text += ", " + recording.features[place.feature].name;
   }
-  return text + fmt::format(", at X{:.1f} Y{:.1f}", place.x_mm, place.y_mm);
+  return text + fmt::format(", at X{:.1f} Y{:.1f}", place.xy_mm.x, place.xy_mm.y);
 }
 
 Safe safe(const Report& report) {

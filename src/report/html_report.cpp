@@ -69,8 +69,8 @@ void append_float(double value, std::string& bytes) {
 std::string packed(const std::vector<Moment>& moments) {
   std::string bytes;
   for (const Moment& m : moments) {
-    for (const double value : {m.time_s, m.contour_mm, m.reference_x_mm, m.reference_y_mm,
-                               m.base_x_mm, m.base_y_mm, m.nozzle_x_mm, m.nozzle_y_mm}) {
+    for (const double value : {m.time_s, m.contour_mm, m.reference_mm.x, m.reference_mm.y,
+                               m.base_mm.x, m.base_mm.y, m.nozzle_mm.x, m.nozzle_mm.y}) {
       append_float(value, bytes);
     }
   }
@@ -80,14 +80,14 @@ std::string packed(const std::vector<Moment>& moments) {
 Json places_json(const std::vector<Place>& places) {
   Json array = Json::array();
   for (const Place& place : places) {
-    array.push_back(
-        {{"line", place.line},
-         {"layer", place.layer},
-         {"feature", place.feature},
-         {"at",
-          {rounded(place.x_mm, 0.001), rounded(place.y_mm, 0.001), rounded(place.z_mm, 0.001)}},
-         {"um", {um(place.before_mm), um(place.after_mm)}},
-         {"moments", {packed(place.before), packed(place.after)}}});
+    array.push_back({{"line", place.line},
+                     {"layer", place.layer},
+                     {"feature", place.feature},
+                     {"at",
+                      {rounded(place.xy_mm.x, 0.001), rounded(place.xy_mm.y, 0.001),
+                       rounded(place.z_mm, 0.001)}},
+                     {"um", {um(place.before_mm), um(place.after_mm)}},
+                     {"moments", {packed(place.before), packed(place.after)}}});
   }
   return array;
 }
@@ -264,8 +264,8 @@ Json data_json(const Report& r) {
           {"layer_step", recording.paths.layer_step},
           {"tolerance_mm", recording.paths.tolerance_mm},
           {"frame",
-           {recording.paths.x_min_mm, recording.paths.y_min_mm, recording.paths.x_max_mm,
-            recording.paths.y_max_mm}},
+           {recording.paths.min_mm.x, recording.paths.min_mm.y, recording.paths.max_mm.x,
+            recording.paths.max_mm.y}},
           {"features", features_json(recording.features)},
           {"worst", {places_json(recording.worst_before), places_json(recording.worst_after)}},
           {"histogram", histogram_json(recording.histogram)},

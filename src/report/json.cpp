@@ -141,8 +141,8 @@ Json place_json(const Report& r, const std::optional<Place>& place, double Place
           {"line", place->line},
           {"layer", slicers_layer(recording, place->layer)},
           {"feature", named ? recording.features[place->feature].name : std::string{}},
-          {"x_mm", place->x_mm},
-          {"y_mm", place->y_mm},
+          {"x_mm", place->xy_mm.x},
+          {"y_mm", place->xy_mm.y},
           {"z_mm", place->z_mm}};
 }
 

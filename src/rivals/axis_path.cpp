@@ -159,4 +159,32 @@ std::vector<dynamics::NozzleState> nozzle_on(const dynamics::FlexibleAxis& axis,
   return result;
 }
 
+double start_s(const Axes<AxisPath>& paths) {
+  return least_of_axes([](const AxisPath& path) { return path.front().start_s; }, paths);
+}
+
+double end_s(const Axes<AxisPath>& paths) {
+  return most_of_axes([](const AxisPath& path) { return end_s(path); }, paths);
+}
+
+NozzleWalkXY::NozzleWalkXY(const Axes<dynamics::FlexibleAxis>& axes, const Axes<AxisPath>& paths,
+                           double start_s)
+    : walks_(map_axes([&](const dynamics::FlexibleAxis& axis,
+                          const AxisPath& path) { return NozzleWalk(axis, path, start_s); },
+                      axes, paths)) {}
+
+dynamics::NozzleMotionXY NozzleWalkXY::motion(double t) {
+  dynamics::NozzleMotionXY result;
+  for_each_axis([&](dynamics::NozzleMotion& own, NozzleWalk& walk) { own = walk.at(t).motion(); },
+                result, walks_);
+  return result;
+}
+
+XY NozzleWalkXY::place_mm(double t) {
+  XY result;
+  for_each_axis([&](double& own_mm, NozzleWalk& walk) { own_mm = walk.at(t).position(); }, result,
+                walks_);
+  return result;
+}
+
 }  // namespace unflex::rivals

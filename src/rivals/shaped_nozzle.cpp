@@ -16,17 +16,16 @@ dynamics::NozzleMotion on_cubic(const dynamics::NozzleMotion& a, const dynamics:
           (from + u * (2.0 * second + 3.0 * u * third)) / h};
 }
 
-ShapedNozzle::ShapedNozzle(const dynamics::ShaperPulses& x, const dynamics::ShaperPulses& y) {
-  const auto set = [&](std::vector<Tap>& taps, const dynamics::ShaperPulses& pulses) {
+ShapedNozzle::ShapedNozzle(const Axes<dynamics::ShaperPulses>& pulses) {
+  const auto set = [&](std::vector<Tap>& taps, const dynamics::ShaperPulses& train) {
     for (const dynamics::Pulse& pulse :
-         pulses.empty() ? dynamics::ShaperPulses{{0.0, 1.0}} : pulses) {
+         train.empty() ? dynamics::ShaperPulses{{0.0, 1.0}} : train) {
       taps.push_back({pulse});
       lookahead_s_ = std::max(lookahead_s_, -pulse.time_s);
       memory_s_ = std::max(memory_s_, pulse.time_s);
     }
   };
-  set(x_, x);
-  set(y_, y);
+  for_each_axis(set, taps_, pulses);
 }
 
 void ShapedNozzle::add(double time_s, const dynamics::NozzleMotionXY& unshaped) {
@@ -38,11 +37,9 @@ double ShapedNozzle::known_until_s() const {
                           : samples_.back().time_s - lookahead_s_;
 }
 
-dynamics::NozzleMotion ShapedNozzle::sum(std::vector<Tap>& taps,
-                                         dynamics::NozzleMotion dynamics::NozzleMotionXY::*axis,
-                                         double time_s) {
+dynamics::NozzleMotion ShapedNozzle::sum(std::size_t axis, double time_s) {
   dynamics::NozzleMotion result;
-  for (Tap& tap : taps) {
+  for (Tap& tap : taps_[axis]) {
     const double t = time_s - tap.pulse.time_s;
     std::size_t i = std::max(tap.index, forgotten_) - forgotten_;
     while (i + 1 < samples_.size() && samples_[i + 1].time_s <= t) {
@@ -50,11 +47,11 @@ dynamics::NozzleMotion ShapedNozzle::sum(std::vector<Tap>& taps,
     }
     tap.index = i + forgotten_;
     const Sample& from = samples_[i];
-    dynamics::NozzleMotion delayed{(from.nozzle.*axis).position, 0.0};
+    dynamics::NozzleMotion delayed{from.nozzle[axis].position, 0.0};
     if (t >= from.time_s && i + 1 < samples_.size()) {
       const Sample& to = samples_[i + 1];
       const double h = to.time_s - from.time_s;
-      delayed = on_cubic(from.nozzle.*axis, to.nozzle.*axis, h, (t - from.time_s) / h);
+      delayed = on_cubic(from.nozzle[axis], to.nozzle[axis], h, (t - from.time_s) / h);
     }
     result.position += tap.pulse.weight * delayed.position;
     result.velocity += tap.pulse.weight * delayed.velocity;
@@ -70,8 +67,10 @@ void ShapedNozzle::forget_before(double time_s) {
 }
 
 dynamics::NozzleMotionXY ShapedNozzle::at(double time_s) {
-  const dynamics::NozzleMotionXY result{sum(x_, &dynamics::NozzleMotionXY::x, time_s),
-                                        sum(y_, &dynamics::NozzleMotionXY::y, time_s)};
+  dynamics::NozzleMotionXY result;
+  for (std::size_t axis = 0; axis < result.kCount; ++axis) {
+    result[axis] = sum(axis, time_s);
+  }
   forget_before(time_s - memory_s_);
   return result;
 }

@@ -19,10 +19,9 @@ double largest_motor_accel(const std::vector<planner::PlannedMove>& moves, const
   double largest = 0.0;
   for (const planner::PlannedMove& move : moves) {
     if (move.accel_s + move.decel_s > 0.0) {
-      largest =
-          std::max(largest, move.accel_mm_s2 * motors.largest_of_xy(move.direction[gcode::X],
-                                                                    move.direction[gcode::Y],
-                                                                    move.direction[gcode::Z]));
+      largest = std::max(
+          largest,
+          move.accel_mm_s2 * motors.largest_of_xy(xy_of(move.direction), move.direction[gcode::Z]));
     }
   }
   return largest;

@@ -31,8 +31,8 @@ void EmissionCost::add(const std::vector<planner::PlannedMove>& original, double
     }
     const gcode::Segment& segment = sliced.move().segment;
     if (t > lead_in_s && segment.extruding()) {
-      const double away_mm = across_mm(segment, real.x.position() - optimal.x.position(),
-                                       real.y.position() - optimal.y.position());
+      const double away_mm =
+          across_mm(segment, dynamics::place_mm(real) - dynamics::place_mm(optimal));
       sum_mm2_ += away_mm * away_mm;
       max_mm_ = std::max(max_mm_, away_mm);
       ++samples_;

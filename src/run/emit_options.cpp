@@ -36,14 +36,12 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
                       .max_accel_mm_s2 = settings.pressure.max_extruder_accel_mm_s2};
   options.lines.tolerance_mm = settings.tolerance_um() * 1e-3;
   // The costs of lines leave out the lead of modes behind each other.
-  options.lines.nozzle_x = machine::nozzle_x(settings);
-  options.lines.nozzle_y = machine::nozzle_y(settings);
+  options.lines.nozzle = machine::nozzle_axes(settings);
   options.lines.freq_error = settings.freq_error();
   const auto reach = [](const std::optional<machine::Range>& travel) {
     return travel ? emit::Reach{travel->min, travel->max} : emit::Reach{.min_mm = 0.0};
   };
-  options.lines.reach_x = reach(settings.printer.travel_x_mm);
-  options.lines.reach_y = reach(settings.printer.travel_y_mm);
+  options.lines.reach = map_axes(reach, settings.printer.travel_mm);
   const FirmwareMotion& motion = spec_of(settings.printer.firmware).motion;
   if (!motion.rounds_to_steps) {
     options.lines.min_line_s = settings.min_line_s();

@@ -56,7 +56,7 @@ gcode::Segment continued(const gcode::Segment& last) {
   gcode::Segment line = last;
   line.start_mm = last.end_mm;
   const double lengths = kAWhile_s * last.feed_mm_s / last.length_mm();
-  for (const gcode::Axis axis : {gcode::X, gcode::Y, gcode::Z, gcode::E}) {
+  for (const gcode::Axis axis : gcode::kXYZE) {
     line.end_mm[axis] += lengths * last.delta(axis);
   }
   if (line.reading_of_e) {
@@ -86,7 +86,7 @@ std::optional<gcode::Segment> left_to_next(const gcode::Position& machine_mm,
   left.start_mm = left.end_mm = at_mm;
   left.feed_mm_s = 1.0;
   left.line = kNoLine;
-  for (const gcode::Axis axis : {gcode::X, gcode::Y, gcode::Z}) {
+  for (const gcode::Axis axis : gcode::kXYZ) {
     left.start_mm[axis] = machine_mm[axis];
   }
   const bool is_left = left.length_mm() > kSamePlace_mm && left.length_mm() < kFewSteps_mm;

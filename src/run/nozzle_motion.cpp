@@ -16,17 +16,24 @@ dynamics::NozzleState swing(const dynamics::FlexibleAxis& axis,
   return dynamics::exact_step(axis, deviation, {}, duration_s);
 }
 
+dynamics::NozzleXY swing(const verify::NozzleModel& model, const dynamics::NozzleXY& deviation,
+                         double duration_s) {
+  return map_axes(
+      [&](const dynamics::FlexibleAxis& axis, const dynamics::NozzleState& of_axis) {
+        return swing(axis, of_axis, duration_s);
+      },
+      model, deviation);
+}
+
 }  // namespace
 
 dynamics::NozzleXY at_rest(const gcode::Position& position, const verify::NozzleModel& model) {
-  return {model.x.riding(position[gcode::X]), model.y.riding(position[gcode::Y])};
+  return dynamics::riding(model, xy_of(position));
 }
 
 dynamics::NozzleXY at_end_of(const planner::PlannedMove& move, const verify::NozzleModel& model) {
-  const gcode::Position& end = move.segment.end_mm;
-  const double v = move.end_v_mm_s;
-  return {model.x.riding(end[gcode::X], v * move.direction[gcode::X]),
-          model.y.riding(end[gcode::Y], v * move.direction[gcode::Y])};
+  return dynamics::riding(model, xy_of(move.segment.end_mm),
+                          move.end_v_mm_s * xy_of(move.direction));
 }
 
 // Goes phase by phase, since the acceleration changes between phases.
@@ -40,23 +47,20 @@ void advance(const planner::PlannedMove& move, double from_s, double to_s,
     if (until_s <= t) {
       continue;
     }
-    const gcode::Position p = move.position_mm(t);
     const double v = move.velocity_mm_s(t);
-    const auto step = [&](gcode::Axis axis, const dynamics::FlexibleAxis& flexible,
-                          const dynamics::NozzleState& state) {
-      const double ratio = move.kinematic ? move.direction[axis] : 0.0;
-      return dynamics::exact_step(flexible, state, {p[axis], v * ratio, phase.accel_mm_s2 * ratio},
-                                  until_s - t);
-    };
-    nozzle.x = step(gcode::X, model.x, nozzle.x);
-    nozzle.y = step(gcode::Y, model.y, nozzle.y);
+    nozzle = map_axes(
+        [&](const dynamics::FlexibleAxis& axis, const dynamics::NozzleState& state, double place_mm,
+            double ratio) {
+          return dynamics::exact_step(axis, state, {place_mm, v * ratio, phase.accel_mm_s2 * ratio},
+                                      until_s - t);
+        },
+        model, nozzle, xy_of(move.position_mm(t)), move.kinematic ? xy_of(move.direction) : XY{});
     t = until_s;
   }
 }
 
-double across_mm(const gcode::Segment& segment, double x_mm, double y_mm) {
-  return std::abs(segment.delta(gcode::X) * y_mm - segment.delta(gcode::Y) * x_mm) /
-         segment.length_xy_mm();
+double across_mm(const gcode::Segment& segment, const XY& offset_mm) {
+  return std::abs(cross(segment.way_xy_mm(), offset_mm)) / segment.length_xy_mm();
 }
 
 NozzleFollower::NozzleFollower(const verify::NozzleModel& model,
@@ -82,13 +86,12 @@ double NozzleFollower::follow(const Piece& piece) {
         set(at_rest(move.segment.start_mm, model_), move.segment.start_mm);
       }
       advance(move, 0.0, move.duration_s(), model_, driven_);
-      ringing_ = {swing(model_.x, ringing_.x, move.duration_s()),
-                  swing(model_.y, ringing_.y, move.duration_s())};
-      base_mm_ = {move.segment.end_mm[gcode::X], move.segment.end_mm[gcode::Y]};
+      ringing_ = swing(model_, ringing_, move.duration_s());
+      base_mm_ = xy_of(move.segment.end_mm);
     }
     if (event.position_lost) {
       // Homing and macros take their time: the nozzle has come to rest.
-      const gcode::Position base_mm{base_mm_[0], base_mm_[1], 0.0, 0.0};
+      const gcode::Position base_mm{base_mm_.x, base_mm_.y, 0.0, 0.0};
       set(at_rest(base_mm, model_), base_mm);
     } else if (event.dwell_s > 0.0) {
       pause(event.dwell_s);
@@ -107,13 +110,16 @@ double NozzleFollower::begin_run(const Piece& run) { return change({}, run.press
 void NozzleFollower::set(const dynamics::NozzleXY& nozzle, const gcode::Position& base) {
   driven_ = nozzle;
   ringing_ = {};
-  base_mm_ = {base[gcode::X], base[gcode::Y]};
+  base_mm_ = xy_of(base);
 }
 
 void NozzleFollower::pause(double duration_s) {
-  driven_.x = dynamics::exact_step(model_.x, driven_.x, {base_mm_[0], 0.0, 0.0}, duration_s);
-  driven_.y = dynamics::exact_step(model_.y, driven_.y, {base_mm_[1], 0.0, 0.0}, duration_s);
-  ringing_ = {swing(model_.x, ringing_.x, duration_s), swing(model_.y, ringing_.y, duration_s)};
+  driven_ = map_axes(
+      [&](const dynamics::FlexibleAxis& axis, const dynamics::NozzleState& state, double base_mm) {
+        return dynamics::exact_step(axis, state, {base_mm, 0.0, 0.0}, duration_s);
+      },
+      model_, driven_, base_mm_);
+  ringing_ = swing(model_, ringing_, duration_s);
 }
 
 // Switches the shaper. Meanwhile the machine stands still: the motion that the old shaper has
@@ -141,9 +147,9 @@ double NozzleFollower::change(const gcode::Shaper& next, const gcode::PressureAd
         }
         return sum;
       };
-  const dynamics::NozzleXY rest = at_rest({base_mm_[0], base_mm_[1], 0.0, 0.0}, model_);
-  const dynamics::NozzleXY ringing{after_stop(model_.x, shaping_.x, driven_.x, ringing_.x, rest.x),
-                                   after_stop(model_.y, shaping_.y, driven_.y, ringing_.y, rest.y)};
+  const dynamics::NozzleXY rest = dynamics::riding(model_, base_mm_);
+  const dynamics::NozzleXY ringing =
+      map_axes(after_stop, model_, shaping_, driven_, ringing_, rest);
   present_ = next;
   shaping_ = planner::shaping(config_, next);
   driven_ = rest;
@@ -151,8 +157,9 @@ double NozzleFollower::change(const gcode::Shaper& next, const gcode::PressureAd
     ringing_ = ringing;
     return stop_s;
   }
-  driven_.x.add(ringing.x);
-  driven_.y.add(ringing.y);
+  for_each_axis(
+      [](dynamics::NozzleState& state, const dynamics::NozzleState& other) { state.add(other); },
+      driven_, ringing);
   ringing_ = {};
   return stop_s;
 }

@@ -28,10 +28,8 @@ PathError path_error(const std::vector<planner::PlannedMove>& plan, double lead_
     on_base.advance(k, nozzle);
     sliced.to(t, [](const planner::PlannedMove&, double, double) {});
     if (t > 0.0 && !sliced.at_end() && sliced.move().segment.extruding()) {
-      const gcode::Position planned = sliced.position_mm();
-      const double away_mm =
-          across_mm(sliced.move().segment, nozzle.x.position() - planned[gcode::X],
-                    nozzle.y.position() - planned[gcode::Y]);
+      const double away_mm = across_mm(sliced.move().segment,
+                                       dynamics::place_mm(nozzle) - xy_of(sliced.position_mm()));
       error.sum_mm2 += away_mm * away_mm;
       ++error.samples;
     }

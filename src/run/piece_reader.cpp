@@ -48,8 +48,7 @@ constexpr std::size_t kBordersPerLook = 8;
 double turn_before(const std::vector<planner::PlannedMove>& moves, std::size_t move) {
   const planner::PlannedMove& from = moves[move - 1];
   const planner::PlannedMove& to = moves[move];
-  return to.start_v_mm_s * math::hypot(to.direction[gcode::X] - from.direction[gcode::X],
-                                       to.direction[gcode::Y] - from.direction[gcode::Y]);
+  return to.start_v_mm_s * distance(xy_of(from.direction), xy_of(to.direction));
 }
 
 // The first moves that take kAround_s.

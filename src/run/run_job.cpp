@@ -32,55 +32,51 @@ std::string failure_of(const RunJob& job) {
 
 // The base of the first stage, shaped by the second, from the course's first node on. For a part
 // this includes the nodes after its last one.
-dynamics::BaseTrajectory both_stages(const RunJob& job, dynamics::AxisTrajectory x,
-                                     dynamics::AxisTrajectory y) {
-  dynamics::BaseTrajectory base{job.grid.period_s, std::move(x), std::move(y)};
+dynamics::BaseTrajectory both_stages(const RunJob& job, Axes<dynamics::AxisTrajectory> first) {
+  dynamics::BaseTrajectory base{std::move(first), job.grid.period_s};
   const std::size_t more = compensate::nodes_of_shaping(job.setup, job.grid.period_s);
   base = compensate::shaped(base, job.setup, job.piece.begins_run() ? more : 0,
                             job.piece.ends_run() ? more : 0);
   const auto before = static_cast<std::ptrdiff_t>(job.grid.first);
-  for (dynamics::AxisTrajectory* axis : {&base.x, &base.y}) {
-    for (std::vector<double>* values :
-         {&axis->position_mm, &axis->velocity_mm_s, &axis->accel_mm_s2}) {
-      values->erase(values->begin(), values->begin() + before);
-    }
-  }
+  for_each_axis(
+      [&](dynamics::AxisTrajectory& axis) {
+        for (std::vector<double>* values :
+             {&axis.position_mm, &axis.velocity_mm_s, &axis.accel_mm_s2}) {
+          values->erase(values->begin(), values->begin() + before);
+        }
+      },
+      base);
   return base;
 }
 
-// Joins what the solvers have found for the axis.
-dynamics::AxisTrajectory joined(RunJob& job, std::size_t axis) {
-  std::vector<dynamics::AxisTrajectory> solutions;
-  for (std::array<AxisResult, 2>& result : job.windows.results) {
-    solutions.push_back(std::move(result[axis].base));
-    job.iterations += static_cast<std::size_t>(result[axis].iterations);
+// Joins what the solvers have found for each axis.
+Axes<dynamics::AxisTrajectory> joined(RunJob& job) {
+  Axes<std::vector<dynamics::AxisTrajectory>> solutions;
+  for (Axes<AxisResult>& result : job.windows.results) {
+    for_each_axis(
+        [&](std::vector<dynamics::AxisTrajectory>& all, AxisResult& of_axis) {
+          all.push_back(std::move(of_axis.base));
+          job.iterations += static_cast<std::size_t>(of_axis.iterations);
+        },
+        solutions, result);
   }
-  return compensate::join(job.windows.spans, solutions);
+  return map_axes([&](const auto& of_axis) { return compensate::join(job.windows.spans, of_axis); },
+                  solutions);
 }
 
 // The base optimised for the nominal axes alone.
 std::optional<dynamics::BaseTrajectory> nominal_base(const RunJob& job) {
   compensate::Setup setup = job.setup;
-  setup.x.plants.clear();
-  setup.y.plants.clear();
+  for_each_axis([](compensate::AxisSetup& axis) { axis.plants.clear(); }, setup);
   if (setup.contour) {
     setup.jerk_weight = setup.contour->tracking_jerk_weight;
     setup.contour.reset();
   }
   const std::unique_ptr<compensate::Engine> engine = compensate::make_banded_engine();
   auto windows = compensate::windows(job.course(), job.windows.spans, job.first_stage, setup);
-  std::vector<dynamics::AxisTrajectory> x;
-  std::vector<dynamics::AxisTrajectory> y;
-  for (std::size_t i = 0; i < windows.size(); ++i) {
-    auto [of_x, of_y] = compensate::solve(*engine, job.windows.spans[i], windows[i]);
-    if (!of_x || !of_y) {
-      return std::nullopt;
-    }
-    x.push_back(std::move(of_x->base));
-    y.push_back(std::move(of_y->base));
-  }
-  return both_stages(job, compensate::join(job.windows.spans, x),
-                     compensate::join(job.windows.spans, y));
+  Result<dynamics::BaseTrajectory> base =
+      compensate::solve_all(*engine, job.windows.spans, windows);
+  return base ? std::optional(both_stages(job, std::move(*base))) : std::nullopt;
 }
 
 void measure_robustness(RunJob& job, const verify::NozzleModel& model) {
@@ -179,9 +175,10 @@ AxisResult axis_result(Result<compensate::AxisSolution> solution) {
 }
 
 dynamics::NozzleXY first_stage(const RunJob& job, const verify::NozzleModel& model) {
-  const gcode::Position& start_mm = job.piece.moves.front().segment.start_mm;
-  return {job.setup.x.axis.swinging_as(model.x, job.nozzle.x, start_mm[gcode::X]),
-          job.setup.y.axis.swinging_as(model.y, job.nozzle.y, start_mm[gcode::Y])};
+  return map_axes([](const compensate::AxisSetup& setup, const dynamics::FlexibleAxis& axis,
+                     const dynamics::NozzleState& nozzle,
+                     double start_mm) { return setup.axis.swinging_as(axis, nozzle, start_mm); },
+                  job.setup, model, job.nozzle, xy_of(job.piece.moves.front().segment.start_mm));
 }
 
 std::vector<compensate::RunWindow> windows_of(const RunJob& job, std::size_t first,
@@ -257,8 +254,11 @@ void choose_timing(RunJob& job, const TimingChoice& choice) noexcept {
     } else if (FoundTiming found = find_timing(job, job.setup, counted); found.timed) {
       job.scaled_reason = std::move(found.scaled_reason);
       if (found.timed->plants) {
-        job.setup.x.plants = std::move(found.timed->plants->x);
-        job.setup.y.plants = std::move(found.timed->plants->y);
+        for_each_axis(
+            [](compensate::AxisSetup& axis, std::vector<compensate::Plant>& plants) {
+              axis.plants = std::move(plants);
+            },
+            job.setup, *found.timed->plants);
       }
       job.retimed = NewTiming{std::move(found.timed->moves),
                               counts_of(job.piece.move_counts, found.timed->pieces),
@@ -314,14 +314,13 @@ bool solve_windows(RunJob& job, std::size_t first, std::size_t count,
   try {
     std::vector<compensate::RunWindow> windows = windows_of(job, first, count);
     for (std::size_t i = 0; i < count; ++i) {
-      compensate::AxisWindow* const problems[] = {&windows[i].x, &windows[i].y};
       compensate::AxisSolutions solutions =
           compensate::solve(engine, of_run.spans[first + i], windows[i]);
-      for (std::size_t axis = 0; axis < 2; ++axis) {
+      for (std::size_t axis = 0; axis < solutions.kCount; ++axis) {
         Result<compensate::AxisSolution>& solution = solutions[axis];
         for (Probe& probe : of_run.probes) {
           if (solution && probe.window == first + i && probe.axis == axis) {
-            set_probe(engine, std::move(*problems[axis]), *solution, probe);
+            set_probe(engine, std::move(windows[i][axis]), *solution, probe);
           }
         }
         of_run.results[first + i][axis] = axis_result(std::move(solution));
@@ -339,11 +338,9 @@ void make_lines(RunJob& job, const RunRules& rules) noexcept {
     job.failure = failure_of(job);
     if (job.failure.empty()) {
       if (job.has_base()) {
-        dynamics::BaseTrajectory& base = *job.retimed->base;
-        job.base = both_stages(job, std::move(base.x), std::move(base.y));
+        job.base = both_stages(job, std::move(*job.retimed->base));
       } else {
-        dynamics::AxisTrajectory x = joined(job, 0);
-        job.base = both_stages(job, std::move(x), joined(job, 1));
+        job.base = both_stages(job, joined(job));
         measure_robustness(job, rules.verify.nozzle);
       }
       job.plan = emit::plan_run(job.run(1.0, 1.0, even_lines_before_s(rules.emit.lines)),

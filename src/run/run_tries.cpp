@@ -49,8 +49,9 @@ std::shared_ptr<RunJob> once_more(const RunJob& job, const Try& next) {
   run->nozzle = job.nozzle;
   run->first_stage = job.first_stage;
   run->setup = next.remedy == Remedy::as_sliced ? job.sliced_setup.value_or(job.setup) : job.setup;
-  run->setup.x.limits.max_accel_mm_s2 *= next.accel_share;
-  run->setup.y.limits.max_accel_mm_s2 *= next.accel_share;
+  for_each_axis(
+      [&](compensate::AxisSetup& axis) { axis.limits.max_accel_mm_s2 *= next.accel_share; },
+      run->setup);
   run->sliced_setup = job.sliced_setup;
   run->search.bounds = job.search.bounds;
   run->search.extruder = job.search.extruder;

@@ -234,8 +234,7 @@ void RunWriter::note_lines_above_budget(const Piece& piece) {
 emit::RunPlan RunWriter::plan(const RunJob& job, double tolerance_share,
                               double limits_share) const {
   emit::Run run = job.run(tolerance_share, limits_share, line_rate_.last_begins_s());
-  const gcode::Position& at = emitter_.printer().state().position_mm;
-  run.from_mm = std::array{at[gcode::X], at[gcode::Y]};
+  run.from_mm = xy_of(emitter_.printer().state().position_mm);
   run.late_s = late_s_;
   run.kept_before = kept_before(job.piece);
   return emit::plan_run(run, emitter_.run_start(), rules_->emit);

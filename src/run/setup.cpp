@@ -75,7 +75,8 @@ compensate::AxisSetup axis_setup(const machine::AxisDynamics& dynamics,
 }
 
 double half_period_s(const machine::Settings& settings) {
-  return 0.5 / std::min(settings.dynamics_x.slowest_hz(), settings.dynamics_y.slowest_hz());
+  return 0.5 / least_of_axes([](const machine::AxisDynamics& axis) { return axis.slowest_hz(); },
+                             settings.dynamics);
 }
 
 // An error of the nozzle that may be seen in a print.
@@ -84,7 +85,7 @@ constexpr double kSeen_mm = 10e-3;
 // Whether the nozzle still swings from the motion before when the run begins.
 bool begins_swinging(const Piece& run, const dynamics::NozzleXY& nozzle,
                      const machine::Settings& settings) {
-  const verify::NozzleModel model{machine::nozzle_x(settings), machine::nozzle_y(settings)};
+  const verify::NozzleModel model{machine::nozzle_axes(settings)};
   return run.begins_run() &&
          verify::swing_mm(nozzle, run.moves.front().segment.start_mm, model) >= kSeen_mm;
 }
@@ -111,42 +112,49 @@ double time_ahead_s(const Piece& run, const compensate::Setup& setup, double soo
   if (!first.segment.extruding()) {
     return 0.0;
   }
-  const double x = first.direction[gcode::X];
-  const double y = first.direction[gcode::Y];
-  const auto lag_mm = [&](const compensate::AxisSetup& axis, double share) {
-    return axis.axis.largest_lag_mm(first.accel_mm_s2 * std::abs(share), 0.0);
-  };
-  const double lag_x_mm = lag_mm(setup.x, x);
-  const double lag_y_mm = lag_mm(setup.y, y);
-  double seen_mm = std::abs(lag_x_mm * std::abs(y) - lag_y_mm * std::abs(x));
+  const XY direction = xy_of(first.direction);
+  const XY shares = map_axes([](double part) { return std::abs(part); }, direction);
+  const XY lag_mm = map_axes(
+      [&](const compensate::AxisSetup& axis, double share) {
+        return axis.axis.largest_lag_mm(first.accel_mm_s2 * share, 0.0);
+      },
+      setup, shares);
+  double seen_mm = std::abs(cross(lag_mm, shares));
   double start_s = first.duration_s();
   for (std::size_t i = 1; i < run.moves.size() && start_s < soon_s; ++i) {
-    const auto& next = run.moves[i].direction;
-    if (x * next[gcode::X] + y * next[gcode::Y] < kStraight) {
-      seen_mm = math::hypot(lag_x_mm, lag_y_mm);
+    if (dot(direction, xy_of(run.moves[i].direction)) < kStraight) {
+      seen_mm = length(lag_mm);
     }
     start_s += run.moves[i].duration_s();
   }
-  return seen_mm > kSeen_mm ? 2.0 * std::sqrt(std::max(lag_x_mm / setup.x.limits.max_accel_mm_s2,
-                                                       lag_y_mm / setup.y.limits.max_accel_mm_s2))
-                            : 0.0;
+  const double slowest_s2 = most_of_axes(
+      [](double lag, const compensate::AxisSetup& axis) {
+        return lag / axis.limits.max_accel_mm_s2;
+      },
+      lag_mm, setup);
+  return seen_mm > kSeen_mm ? 2.0 * std::sqrt(slowest_s2) : 0.0;
 }
 
 }  // namespace
 
 compensate::Setup compensate_setup(const machine::Settings& settings) {
   compensate::Setup setup;
-  setup.x = axis_setup(settings.dynamics_x, settings.printer.travel_x_mm, settings);
-  setup.y = axis_setup(settings.dynamics_y, settings.printer.travel_y_mm, settings);
-  setup.x.pulses = pulses_of(settings, settings.second.x_freq_hz, settings.second.x_damping_ratio);
-  setup.y.pulses = pulses_of(settings, settings.second.y_freq_hz, settings.second.y_damping_ratio);
+  for_each_axis(
+      [&](compensate::AxisSetup& axis, const machine::AxisDynamics& dynamics,
+          const std::optional<machine::Range>& travel, double second_hz, double second_damping) {
+        axis = axis_setup(dynamics, travel, settings);
+        axis.pulses = pulses_of(settings, second_hz, second_damping);
+      },
+      setup, settings.dynamics, settings.printer.travel_mm, settings.second.freq_hz,
+      settings.second.damping_ratio);
   setup.shares_motors = shares_motors(settings);
   setup.period_s = settings.period_ms() * 1e-3;
   setup.lead_in_s = settings.solve.lead_in_ms * 1e-3;
   setup.tail_s = settings.tail_s();
   setup.window_s = settings.solve.window_s;
-  setup.overlap_s = std::clamp(std::max(setup.x.axis.unseen_s(), setup.y.axis.unseen_s()),
-                               settings.solve.overlap_s, settings.solve.window_s);
+  const double unseen_s =
+      most_of_axes([](const compensate::AxisSetup& axis) { return axis.axis.unseen_s(); }, setup);
+  setup.overlap_s = std::clamp(unseen_s, settings.solve.overlap_s, settings.solve.window_s);
   setup.travel_weight = settings.solve.travel_weight;
   setup.jerk_weight = settings.jerk_weight();
   // What swings at the end of a run, travel before a wall for instance, is drawn by the next.
@@ -158,7 +166,7 @@ compensate::Setup compensate_setup(const machine::Settings& settings) {
     setup.overlap_s = std::min(std::max(setup.overlap_s, kLeastOverlap_s), setup.window_s);
     setup.contour = compensate::Contour{.along_weight = settings.along_weight(),
                                         .tracking_jerk_weight = settings.tracking_jerk_weight(),
-                                        .pairs = compensate::pairs_of(setup.x, setup.y)};
+                                        .pairs = compensate::pairs_of(setup)};
   }
   return setup;
 }
@@ -176,20 +184,17 @@ RunSetup setup_for(const compensate::Setup& setup, const Piece& run,
   result.accel = {planned_base_accel_mm_s2(settings, result.asked_accel_mm_s2, !swings),
                   settings.emit_accel_mm_s2(result.asked_accel_mm_s2)};
   result.accel_by_lines_mm_s2 = accel_by_lines_mm_s2(settings);
-  for (compensate::AxisSetup* const axis : {&result.setup.x, &result.setup.y}) {
-    axis->limits.max_accel_mm_s2 = result.accel.base_mm_s2;
-  }
-  const auto keep_above_zero = [&](gcode::Axis axis, const std::optional<machine::Range>& travel,
-                                   compensate::BaseLimits& limits) {
+  for_each_axis(
+      [&](compensate::AxisSetup& axis) { axis.limits.max_accel_mm_s2 = result.accel.base_mm_s2; },
+      result.setup);
+  for (std::size_t axis = 0; axis < XY::kCount; ++axis) {
     const bool above = std::ranges::all_of(run.moves, [&](const planner::PlannedMove& move) {
       return move.segment.start_mm[axis] >= 0.0 && move.segment.end_mm[axis] >= 0.0;
     });
-    if (!travel && above) {
-      limits.min_position_mm = 0.0;
+    if (!settings.printer.travel_mm[axis] && above) {
+      result.setup[axis].limits.min_position_mm = 0.0;
     }
-  };
-  keep_above_zero(gcode::X, settings.printer.travel_x_mm, result.setup.x.limits);
-  keep_above_zero(gcode::Y, settings.printer.travel_y_mm, result.setup.y.limits);
+  }
   if (run.begins_run()) {
     const double half_s = half_period_s(settings);
     const double swing_s = swings && draws_soon(run, settings) ? half_s : 0.0;

@@ -9,8 +9,6 @@ namespace unflex::run {
 namespace {
 
 constexpr double kOnTheEdge_mm = 1e-3;
-constexpr std::array<std::string_view, 2> kNames = {"X", "Y"};
-constexpr std::array<gcode::Axis, 2> kAxes = {gcode::X, gcode::Y};
 
 void append(std::string& text, const std::string& word) {
   text += text.empty() ? word : " " + word;
@@ -19,13 +17,12 @@ void append(std::string& text, const std::string& word) {
 }  // namespace
 
 TravelCheck::TravelCheck(const verify::TravelLimits& limits)
-    : sides_{Side{limits.x_min_mm, limits.x_max_mm, limits.x_min_assumed},
-             Side{limits.y_min_mm, limits.y_max_mm, limits.y_min_assumed}} {}
+    : sides_(map_axes([](const verify::TravelRange& limit) { return Side{limit}; }, limits)) {}
 
 // Whether the place is outside.
 bool TravelCheck::Side::add(double at_mm) {
-  const double below_mm = min_assumed ? 0.0 : min_mm - at_mm;
-  const double above_mm = at_mm - max_mm;
+  const double below_mm = limit.min_assumed ? 0.0 : limit.min_mm - at_mm;
+  const double above_mm = at_mm - limit.max_mm;
   under_mm = std::max(under_mm, below_mm);
   over_mm = std::max(over_mm, above_mm);
   return std::max(below_mm, above_mm) > kOnTheEdge_mm;
@@ -35,14 +32,15 @@ bool TravelCheck::Side::is_left() const { return std::max(under_mm, over_mm) > k
 
 // The place that is furthest out.
 double TravelCheck::Side::furthest_mm() const {
-  return over_mm > under_mm ? max_mm + over_mm : min_mm - under_mm;
+  return over_mm > under_mm ? limit.max_mm + over_mm : limit.min_mm - under_mm;
 }
 
 void TravelCheck::add(const gcode::Event& event) {
   bool outside = false;
   for (const gcode::Segment& segment : event.segments) {
-    for (std::size_t i = 0; i < sides_.size() && segment.moves_xy(); ++i) {
-      outside = sides_[i].add(segment.end_mm[kAxes[i]]) || outside;
+    if (segment.moves_xy()) {
+      for_each_axis([&](Side& side, double end_mm) { outside = side.add(end_mm) || outside; },
+                    sides_, xy_of(segment.end_mm));
     }
   }
   if (outside && moves_++ == 0) {
@@ -56,15 +54,17 @@ std::optional<Diagnostic> TravelCheck::warning(const std::string& file) const {
   }
   std::string travel;
   std::string reach;
-  for (std::size_t i = 0; i < sides_.size(); ++i) {
-    const Side& side = sides_[i];
-    if (side.max_mm < verify::TravelLimits{}.x_max_mm) {
-      append(travel, fmt::format("{}{:.6g}..{:.6g}", kNames[i], side.min_mm, side.max_mm));
-    }
-    if (side.is_left()) {
-      append(reach, fmt::format("{}{:.6g}", kNames[i], side.furthest_mm()));
-    }
-  }
+  for_each_axis(
+      [&](std::string_view letter, const Side& side) {
+        const auto [min_mm, max_mm, min_assumed] = side.limit;
+        if (max_mm < verify::TravelRange{}.max_mm) {
+          append(travel, fmt::format("{}{:.6g}..{:.6g}", letter, min_mm, max_mm));
+        }
+        if (side.is_left()) {
+          append(reach, fmt::format("{}{:.6g}", letter, side.furthest_mm()));
+        }
+      },
+      kAxisLetters, sides_);
   return Diagnostic{
       {file, first_line_},
       fmt::format("{} the printer's travel of {}, first in line {}, as far as {}: the printer "

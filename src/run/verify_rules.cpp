@@ -11,19 +11,19 @@ namespace {
 // The nozzle of each plant: the n-th of both axes, or the axis as given where it has fewer.
 std::vector<verify::NozzleModel> nozzles_of_plants(const machine::Settings& settings,
                                                    const verify::NozzleModel& nominal) {
-  const std::vector<machine::PlantSettings>& x = settings.dynamics_x.plants;
-  const std::vector<machine::PlantSettings>& y = settings.dynamics_y.plants;
-  const machine::SecondSettings& second = settings.second;
-  std::vector<verify::NozzleModel> nozzles(std::max(x.size(), y.size()), nominal);
-  for (std::size_t i = 0; i < nozzles.size(); ++i) {
-    if (i < x.size()) {
-      nozzles[i].x = machine::behind(machine::flexible_axis(x[i].modes), second.x_freq_hz,
-                                     second.x_damping_ratio);
-    }
-    if (i < y.size()) {
-      nozzles[i].y = machine::behind(machine::flexible_axis(y[i].modes), second.y_freq_hz,
-                                     second.y_damping_ratio);
-    }
+  const std::size_t most = most_of_axes(
+      [](const machine::AxisDynamics& axis) { return axis.plants.size(); }, settings.dynamics);
+  std::vector<verify::NozzleModel> nozzles(most, nominal);
+  for (std::size_t i = 0; i < most; ++i) {
+    for_each_axis(
+        [&](dynamics::FlexibleAxis& nozzle, const machine::AxisDynamics& axis, double second_hz,
+            double second_damping) {
+          if (i < axis.plants.size()) {
+            nozzle = machine::behind(machine::flexible_axis(axis.plants[i].modes), second_hz,
+                                     second_damping);
+          }
+        },
+        nozzles[i], settings.dynamics, settings.second.freq_hz, settings.second.damping_ratio);
   }
   return nozzles;
 }
@@ -47,19 +47,16 @@ verify::Rules verify_rules(const machine::Settings& settings) {
   rules.interpreter = machine::interpreter_options(settings);
   rules.limits = machine::planner_limits(settings);
   rules.fixed = machine::firmware_config(settings);
-  rules.nozzle = {machine::nozzle_x(settings), machine::nozzle_y(settings),
-                  settings.verify.step_ms * 1e-3, settings.verify.hold_s};
+  rules.nozzle = {machine::nozzle_axes(settings), settings.verify.step_ms * 1e-3,
+                  settings.verify.hold_s};
   rules.plants = nozzles_of_plants(settings, rules.nozzle);
-  const auto set_range = [](const std::optional<machine::Range>& travel, double& min, double& max,
-                            bool& min_assumed) {
-    min_assumed = !travel;
-    min = travel ? travel->min : 0.0;
-    max = travel ? travel->max : max;
-  };
-  set_range(settings.printer.travel_x_mm, rules.travel.x_min_mm, rules.travel.x_max_mm,
-            rules.travel.x_min_assumed);
-  set_range(settings.printer.travel_y_mm, rules.travel.y_min_mm, rules.travel.y_max_mm,
-            rules.travel.y_min_assumed);
+  for_each_axis(
+      [](const std::optional<machine::Range>& travel, verify::TravelRange& range) {
+        range.min_assumed = !travel;
+        range.min_mm = travel ? travel->min : 0.0;
+        range.max_mm = travel ? travel->max : range.max_mm;
+      },
+      settings.printer.travel_mm, rules.travel);
   rules.base_max_velocity_mm_s = settings.base_max_velocity_mm_s();
   rules.base_max_accel_mm_s2 = settings.base_max_accel_mm_s2();
   rules.base_accel_times_plan = settings.base_accel_times_asked();

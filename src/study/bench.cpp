@@ -14,13 +14,16 @@ namespace unflex::study {
 namespace {
 
 double reach_s(const Nozzle& nozzle) {
-  return reach_of(std::min(nozzle.x.slowest_rad_s(), nozzle.y.slowest_rad_s()));
+  return reach_of(least_of_axes(
+      [](const dynamics::FlexibleAxis& axis) { return axis.slowest_rad_s(); }, nozzle));
 }
 
 double gap_mm(const BaseMotion& base, const std::vector<planner::PlannedMove>& plan) {
-  const gcode::Position& target = plan.back().segment.end_mm;
-  return std::max(std::abs(base.x.back().motion.position - target[gcode::X]),
-                  std::abs(base.y.back().motion.position - target[gcode::Y]));
+  return most_of_axes(
+      [](const rivals::AxisPath& path, double target_mm) {
+        return std::abs(path.back().motion.position - target_mm);
+      },
+      base, xy_of(plan.back().segment.end_mm));
 }
 
 Trace trace_of(const BaseMotion& base, const std::vector<planner::PlannedMove>& plan,
@@ -32,17 +35,22 @@ Trace trace_of(const BaseMotion& base, const std::vector<planner::PlannedMove>& 
     return rivals::NozzleWalk(axis, path, std::min(path.front().start_s, setup.trace_from_s));
   };
   const Nozzle hung = setup.nozzle();
-  rivals::NozzleWalk x = walk(hung.x, base.x);
-  rivals::NozzleWalk y = walk(hung.y, base.y);
-  rivals::PathCursor base_x(base.x);
-  rivals::PathCursor base_y(base.y);
+  Axes<rivals::NozzleWalk> walks = map_axes(walk, hung, base);
+  Axes<rivals::PathCursor> cursors =
+      map_axes([](const rivals::AxisPath& path) { return rivals::PathCursor(path); }, base);
   ContourGauge gauge(plan, reach_s(hung));
   for (std::size_t k = 0; k < trace.grid.count; ++k) {
     const double t = trace.grid.at(k);
-    trace.base.push_back({base_x.at(t), base_y.at(t)});
-    trace.nozzle.push_back({x.at(t).motion(), y.at(t).motion()});
-    const dynamics::NozzleMotionXY& nozzle = trace.nozzle.back();
-    trace.error_mm.push_back(gauge.measure(t, nozzle.x.position, nozzle.y.position).distance_mm);
+    XY place_mm;
+    for_each_axis(
+        [&](dynamics::NozzleMotion& of_base, dynamics::NozzleMotion& of_nozzle, double& at_mm,
+            rivals::PathCursor& cursor, rivals::NozzleWalk& nozzle) {
+          of_base = cursor.at(t);
+          of_nozzle = nozzle.at(t).motion();
+          at_mm = of_nozzle.position;
+        },
+        trace.base.emplace_back(), trace.nozzle.emplace_back(), place_mm, cursors, walks);
+    trace.error_mm.push_back(gauge.measure(t, place_mm).distance_mm);
   }
   return trace;
 }
@@ -77,13 +85,12 @@ MethodResult try_one(Method method, const Run& run, const BenchSetup& setup,
   if (setup.trace_step_s > 0.0) {
     result.trace = trace_of(*base, plan, setup);
   }
-  const rivals::PeakMotion x = rivals::peak(base->x);
-  const rivals::PeakMotion y = rivals::peak(base->y);
-  result.base_peak = {std::max(x.velocity_mm_s, y.velocity_mm_s),
-                      std::max(x.accel_mm_s2, y.accel_mm_s2)};
+  const auto peaks = map_axes(rivals::peak, *base);
+  result.base_peak = {
+      most_of_axes([](const rivals::PeakMotion& peak) { return peak.velocity_mm_s; }, peaks),
+      most_of_axes([](const rivals::PeakMotion& peak) { return peak.accel_mm_s2; }, peaks)};
   result.end_gap_mm = gap_mm(*base, plan);
-  result.longer_s =
-      std::max(rivals::end_s(base->x), rivals::end_s(base->y)) - planner::duration_s(run.plan);
+  result.longer_s = rivals::end_s(*base) - planner::duration_s(run.plan);
   return result;
 }
 
@@ -92,17 +99,18 @@ MethodResult try_one(Method method, const Run& run, const BenchSetup& setup,
 Straying straying(const BaseMotion& base, const std::vector<planner::PlannedMove>& plan,
                   const BenchSetup& setup, double frequency_error) {
   const double plan_end_s = planner::duration_s(plan);
-  const double start_s = std::min({0.0, base.x.front().start_s, base.y.front().start_s});
-  const double end_s =
-      std::max({plan_end_s, rivals::end_s(base.x), rivals::end_s(base.y)}) + setup.hold_s;
+  const double start_s = std::min(0.0, rivals::start_s(base));
+  const double end_s = std::max(plan_end_s, rivals::end_s(base)) + setup.hold_s;
   // Samples stand at whole steps from the plan's beginning.
   const double before = std::ceil(-start_s / setup.step_s);
   const rivals::TimeGrid grid{
       -before * setup.step_s, setup.step_s,
       static_cast<std::size_t>(before + std::ceil(end_s / setup.step_s - 1e-6)) + 1};
   const Nozzle hung = setup.nozzle();
-  rivals::NozzleWalk x(hung.x.detuned(1.0 + frequency_error), base.x, grid.start_s);
-  rivals::NozzleWalk y(hung.y.detuned(1.0 + frequency_error), base.y, grid.start_s);
+  const auto detuned = [&](const dynamics::FlexibleAxis& axis) {
+    return axis.detuned(1.0 + frequency_error);
+  };
+  rivals::NozzleWalkXY nozzle(map_axes(detuned, hung), base, grid.start_s);
   ContourGauge gauge(plan, reach_s(hung));
   verify::CornerGauge corners(reach_s(hung));
   double move_start_s = 0.0;
@@ -113,10 +121,9 @@ Straying straying(const BaseMotion& base, const std::vector<planner::PlannedMove
   Straying result;
   for (std::size_t k = 0; k < grid.count; ++k) {
     const double t = grid.at(k);
-    const double x_mm = x.at(t).position();
-    const double y_mm = y.at(t).position();
-    corners.sample(t, x_mm, y_mm);
-    const auto reading = gauge.measure(t, x_mm, y_mm);
+    const XY at_mm = nozzle.place_mm(t);
+    corners.sample(t, at_mm);
+    const auto reading = gauge.measure(t, at_mm);
     if (t > plan_end_s) {
       result.after_max_mm = std::max(result.after_max_mm, reading.distance_mm);
     } else if (t >= 0.0 && reading.extruding) {

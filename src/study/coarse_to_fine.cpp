@@ -7,7 +7,10 @@
 #include <optional>
 
 #include "gauge.hpp"
+#include "unflex/core/axes.hpp"
 #include "unflex/rivals/axis_path.hpp"
+#include "unflex_base.hpp"
+#include "values_of.hpp"
 
 namespace unflex::study {
 namespace {
@@ -17,12 +20,12 @@ constexpr int kRepeats = 5;
 constexpr double kEnough_s = 0.02;
 constexpr int kParts = 8;
 
-struct Solved {
-  compensate::AxisSolution x;
-  compensate::AxisSolution y;
+struct Solved : Axes<compensate::AxisSolution> {
   double wall_s = 0.0;
 
-  [[nodiscard]] int iterations() const { return x.iterations + y.iterations; }
+  [[nodiscard]] int iterations() const {
+    return sum_of_axes([](const compensate::AxisSolution& of) { return of.iterations; }, *this);
+  }
 };
 
 // Solves several times to find the least time. Each solve gives the same result.
@@ -32,16 +35,15 @@ Result<Solved> solve(const compensate::RunWindow& window, const compensate::Engi
   double spent_s = 0.0;
   for (int i = 0; i < kRepeats && spent_s < kEnough_s; ++i) {
     const auto start = std::chrono::steady_clock::now();
-    Result<compensate::AxisSolution> x = engine.solve(window.x);
-    Result<compensate::AxisSolution> y = engine.solve(window.y);
+    compensate::AxisSolutions both =
+        map_axes([&](const compensate::AxisWindow& of) { return engine.solve(of); }, window);
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
-    if (!x || !y) {
-      return tl::unexpected(x ? y.error() : x.error());
+    Result<Axes<compensate::AxisSolution>> solutions = values_of(std::move(both));
+    if (!solutions) {
+      return tl::unexpected(solutions.error());
     }
     spent_s += took.count();
-    solved.wall_s = std::min(solved.wall_s, took.count());
-    solved.x = std::move(*x);
-    solved.y = std::move(*y);
+    solved = {std::move(*solutions), std::min(solved.wall_s, took.count())};
   }
   return solved;
 }
@@ -69,13 +71,10 @@ compensate::RunWindow window_of(const Run& run, const BenchSetup& bench, double 
                                 double period_s) {
   compensate::Setup setup = bench.unflex;
   setup.period_s = period_s;
-  setup.x.limits.max_accel_mm_s2 = multiple * bench.plan_accel_mm_s2;
-  setup.y.limits.max_accel_mm_s2 = multiple * bench.plan_accel_mm_s2;
+  limit_accel(setup, multiple * bench.plan_accel_mm_s2);
   const std::size_t nodes = compensate::node_grid(run.plan, setup).count;
-  const gcode::Position& start = run.plan.front().segment.start_mm;
-  return compensate::windows(
-             run.plan, {{0, nodes - 1, 0, nodes - 1}},
-             {setup.x.axis.riding(start[gcode::X]), setup.y.axis.riding(start[gcode::Y])}, setup)
+  return compensate::windows(run.plan, {{0, nodes - 1, 0, nodes - 1}},
+                             at_rest(setup, run.plan.front().segment.start_mm), setup)
       .front();
 }
 
@@ -106,20 +105,28 @@ Result<std::vector<ChainStep>> coarse_to_fine(const Run& run, const BenchSetup& 
                    .cold_s = cold->wall_s,
                    .warm_s = cold->wall_s};
     if (coarse) {
-      window.x.guess = refine(coarse->x.base, chain.back().period_s, window.x);
-      window.y.guess = refine(coarse->y.base, chain.back().period_s, window.y);
+      for_each_axis(
+          [&](compensate::AxisWindow& fine, const compensate::AxisSolution& of) {
+            fine.guess = refine(of.base, chain.back().period_s, fine);
+          },
+          window, *coarse);
       const Result<Solved> warm = solve(window, engine);
       if (!warm) {
         return tl::unexpected(warm.error());
       }
       step.warm_iterations = warm->iterations();
       step.warm_s = warm->wall_s;
-      step.difference_mm = std::max(difference_mm(warm->x.base, cold->x.base),
-                                    difference_mm(warm->y.base, cold->y.base));
+      step.difference_mm = most_of_axes(
+          [](const compensate::AxisSolution& a, const compensate::AxisSolution& b) {
+            return difference_mm(a.base, b.base);
+          },
+          *warm, *cold);
     }
-    const BaseMotion base{
-        rivals::through_nodes(cold->x.base, -setup.unflex.lead_in_s, period_s, kParts),
-        rivals::through_nodes(cold->y.base, -setup.unflex.lead_in_s, period_s, kParts)};
+    const BaseMotion base{map_axes(
+        [&](const compensate::AxisSolution& of) {
+          return rivals::through_nodes(of.base, -setup.unflex.lead_in_s, period_s, kParts);
+        },
+        *cold)};
     step.contour_max_mm = straying(base, run.plan, setup, 0.0).max_mm;
     chain.push_back(step);
     coarse = *cold;

@@ -5,8 +5,6 @@
 #include <limits>
 #include <numbers>
 
-#include "unflex/core/math.hpp"
-
 namespace unflex::study {
 
 double reach_of(double slowest_rad_s) {
@@ -18,27 +16,24 @@ ContourGauge::ContourGauge(const std::vector<planner::PlannedMove>& moves, doubl
     : reach_s_(reach_s) {
   double start_s = 0.0;
   for (const planner::PlannedMove& move : moves) {
-    const gcode::Position& from = move.segment.start_mm;
-    const gcode::Position& to = move.segment.end_mm;
-    const double dx = to[gcode::X] - from[gcode::X];
-    const double dy = to[gcode::Y] - from[gcode::Y];
-    const double length = math::hypot(dx, dy);
+    const XY from_mm = xy_of(move.segment.start_mm);
+    const XY way_mm = xy_of(move.segment.end_mm) - from_mm;
+    const double length_mm = length(way_mm);
     Edge edge{.start_s = start_s,
               .end_s = start_s + move.duration_s(),
-              .x_mm = from[gcode::X],
-              .y_mm = from[gcode::Y],
-              .length_mm = length,
+              .from_mm = from_mm,
+              .direction = {},
+              .length_mm = length_mm,
               .extruding = move.segment.extruding()};
-    if (length > 0.0) {
-      edge.direction_x = dx / length;
-      edge.direction_y = dy / length;
+    if (length_mm > 0.0) {
+      edge.direction = way_mm / length_mm;
     }
     start_s = edge.end_s;
     edges_.push_back(edge);
   }
 }
 
-ContourGauge::Reading ContourGauge::measure(double time_s, double x_mm, double y_mm) {
+ContourGauge::Reading ContourGauge::measure(double time_s, const XY& place_mm) {
   const std::size_t last = edges_.size() - 1;
   while (first_ < last && edges_[first_].end_s < time_s - reach_s_) {
     ++first_;
@@ -52,13 +47,9 @@ ContourGauge::Reading ContourGauge::measure(double time_s, double x_mm, double y
   double best2 = std::numeric_limits<double>::infinity();
   for (std::size_t i = first_; i < end_; ++i) {
     const Edge& edge = edges_[i];
-    const double x = x_mm - edge.x_mm;
-    const double y = y_mm - edge.y_mm;
-    const double along =
-        std::clamp(x * edge.direction_x + y * edge.direction_y, 0.0, edge.length_mm);
-    const double across_x = x - along * edge.direction_x;
-    const double across_y = y - along * edge.direction_y;
-    best2 = std::min(best2, across_x * across_x + across_y * across_y);
+    const XY from_start_mm = place_mm - edge.from_mm;
+    const double along_mm = std::clamp(dot(from_start_mm, edge.direction), 0.0, edge.length_mm);
+    best2 = std::min(best2, squared(from_start_mm - along_mm * edge.direction));
   }
   return {std::sqrt(best2), edges_[current_].extruding};
 }

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "unflex/core/xy.hpp"
 #include "unflex/planner/planner.hpp"
 
 namespace unflex::study {
@@ -22,16 +23,14 @@ class ContourGauge {
     bool extruding = false;  // the plan lays filament at this time
   };
   // Times must not decrease from call to call.
-  [[nodiscard]] Reading measure(double time_s, double x_mm, double y_mm);
+  [[nodiscard]] Reading measure(double time_s, const XY& place_mm);
 
  private:
   struct Edge {
     double start_s = 0.0;
     double end_s = 0.0;
-    double x_mm = 0.0;
-    double y_mm = 0.0;
-    double direction_x = 0.0;
-    double direction_y = 0.0;
+    XY from_mm;
+    XY direction;
     double length_mm = 0.0;
     bool extruding = false;
   };

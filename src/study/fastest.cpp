@@ -22,6 +22,7 @@
 #include "unflex/planner/klipper_planner.hpp"
 #include "unflex/rivals/axis_path.hpp"
 #include "unflex/rivals/klipper_calibration.hpp"
+#include "values_of.hpp"
 
 namespace unflex::study {
 namespace {
@@ -113,14 +114,14 @@ class LargestErrors {
   double max_mm_ = 0.0;
 };
 
-struct AxisShapers {
-  ShaperPulses x;  // empty: none
-  ShaperPulses y;
-};
+using AxisShapers = Axes<ShaperPulses>;  // empty: none
 
-rivals::AxisPath base_path(const StretchPlan& plan, gcode::Axis axis, const ShaperPulses& pulses) {
-  rivals::AxisPath path = rivals::reference_path(plan, axis);
-  return pulses.empty() ? path : rivals::shaped(path, pulses);
+Axes<rivals::AxisPath> base_paths(const StretchPlan& plan, const AxisShapers& shapers) {
+  return map_axes(
+      [](const rivals::AxisPath& path, const ShaperPulses& pulses) {
+        return pulses.empty() ? path : rivals::shaped(path, pulses);
+      },
+      rivals::on_axes_of(plan, rivals::reference_path), shapers);
 }
 
 double extruding_s(const std::vector<StretchPlan>& plans) {
@@ -138,22 +139,20 @@ template <class Breaks>
 std::optional<PathErrors> measured(const std::vector<StretchPlan>& plans,
                                    const AxisShapers& shapers, const Nozzle& nozzle,
                                    const Breaks& breaks) {
-  const double reach_s = reach_of(std::min(nozzle.x.slowest_rad_s(), nozzle.y.slowest_rad_s()));
+  const double reach_s = reach_of(least_of_axes(
+      [](const dynamics::FlexibleAxis& axis) { return axis.slowest_rad_s(); }, nozzle));
   LargestErrors largest(extruding_s(plans));
   for (const StretchPlan& plan : plans) {
     if (std::ranges::none_of(plan, [](const auto& move) { return move.segment.extruding(); })) {
       continue;
     }
-    const rivals::AxisPath base_x = base_path(plan, gcode::X, shapers.x);
-    const rivals::AxisPath base_y = base_path(plan, gcode::Y, shapers.y);
-    const double start_s = std::min({0.0, base_x.front().start_s, base_y.front().start_s});
-    rivals::NozzleWalk x(nozzle.x, base_x, start_s);
-    rivals::NozzleWalk y(nozzle.y, base_y, start_s);
+    const Axes<rivals::AxisPath> base = base_paths(plan, shapers);
+    rivals::NozzleWalkXY walk(nozzle, base, std::min(0.0, rivals::start_s(base)));
     ContourGauge gauge(plan, reach_s);
     const double end_s = planner::duration_s(plan);
     for (std::size_t k = 0; static_cast<double>(k) * kPrintStep_s < end_s; ++k) {
       const double t = static_cast<double>(k) * kPrintStep_s;
-      const auto reading = gauge.measure(t, x.at(t).position(), y.at(t).position());
+      const auto reading = gauge.measure(t, walk.place_mm(t));
       if (!reading.extruding) {
         continue;
       }
@@ -168,18 +167,19 @@ std::optional<PathErrors> measured(const std::vector<StretchPlan>& plans,
 
 // Shapers of one kind, tuned to the axes.
 Result<AxisShapers> tuned(ShaperKind kind, const Nozzle& nozzle) {
-  Result<BuiltShaper> x = built_shaper(kind, nozzle.x);
-  Result<BuiltShaper> y = built_shaper(kind, nozzle.y);
-  if (!x || !y) {
-    return tl::unexpected(x ? y.error() : x.error());
-  }
-  return AxisShapers{std::move(x->pulses), std::move(y->pulses)};
+  const auto built = map_axes(
+      [&](const dynamics::FlexibleAxis& axis) { return built_shaper(kind, axis); }, nozzle);
+  return values_of(built).map([](const Axes<BuiltShaper>& shapers) {
+    return map_axes([](const BuiltShaper& shaper) { return shaper.pulses; }, shapers);
+  });
 }
 
 // What Klipper's calibration advises for the axis that smooths more.
 PlanLimits advised_limits(const AxisShapers& shapers) {
-  return {std::min(rivals::advised_accel_mm_s2(shapers.x), rivals::advised_accel_mm_s2(shapers.y)),
-          rivals::kCalibrationCorner_mm_s};
+  const auto advised = [](const ShaperPulses& pulses) {
+    return rivals::advised_accel_mm_s2(pulses);
+  };
+  return {least_of_axes(advised, shapers), rivals::kCalibrationCorner_mm_s};
 }
 
 }  // namespace

@@ -67,11 +67,11 @@ Plot over_time(const std::vector<Track>& list, double dynamics::NozzleMotion::*q
                const dynamics::NozzleMotionXY& from, std::string title, std::string label) {
   Plot plot{.title = std::move(title), .x_label = "t, ms", .y_label = std::move(label)};
   for (const Track& track : list) {
-    for (const auto axis : {&dynamics::NozzleMotionXY::x, &dynamics::NozzleMotionXY::y}) {
+    for (std::size_t axis = 0; axis < from.kCount; ++axis) {
       PlotCurve curve = curve_of(track);
       for (std::size_t k = 0; k < track.states->size(); ++k) {
         curve.points.push_back(
-            {1e3 * track.grid->at(k), (*track.states)[k].*axis.*quantity - from.*axis.*quantity});
+            {1e3 * track.grid->at(k), (*track.states)[k][axis].*quantity - from[axis].*quantity});
       }
       plot.curves.push_back(std::move(curve));
     }
@@ -149,8 +149,9 @@ std::string figures(const CaseResult& result, const MethodResult& method) {
 
   const Plot plane = in_the_plane(list, fmt::format("Path in the plane, {}", of));
   Plot corner = in_the_plane(list, fmt::format("Zoomed in, {}", of));
-  corner.x = report::PlotRange{result.focus_x_mm - half, result.focus_x_mm + half};
-  corner.y = report::PlotRange{result.focus_y_mm - half, result.focus_y_mm + half};
+  const auto around = [&](double at_mm) { return report::PlotRange{at_mm - half, at_mm + half}; };
+  corner.x = around(result.focus_mm.x);
+  corner.y = around(result.focus_mm.y);
   std::string html = report::svg_legend(plane) + "<div class=\"plots\">\n";
   html += figure("Path in the plane", plane);
   html += figure("Zoomed in where it matters", corner);

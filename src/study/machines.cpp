@@ -49,11 +49,13 @@ class TrueNozzle {
 
 double reach_s(const Machine& machine) {
   double slowest = std::numeric_limits<double>::infinity();
-  for (const MachineAxis* axis : {&machine.x, &machine.y}) {
-    for (const dynamics::Mode& mode : axis->truth) {
-      slowest = std::min(slowest, mode.omega_rad_s);
-    }
-  }
+  for_each_axis(
+      [&](const MachineAxis& axis) {
+        for (const dynamics::Mode& mode : axis.truth) {
+          slowest = std::min(slowest, mode.omega_rad_s);
+        }
+      },
+      machine.axes);
   return reach_of(slowest);
 }
 
@@ -65,9 +67,12 @@ struct RunStraying {
 
 RunStraying straying_of(const Machine& machine, double shift, const BaseMotion& base,
                         const Run& run) {
-  const double start_s = std::min({0.0, base.x.front().start_s, base.y.front().start_s});
-  TrueNozzle x(machine.x.truth, shift, base.x, start_s);
-  TrueNozzle y(machine.y.truth, shift, base.y, start_s);
+  const double start_s = std::min(0.0, rivals::start_s(base));
+  Axes<TrueNozzle> nozzle = map_axes(
+      [&](const MachineAxis& axis, const rivals::AxisPath& path) {
+        return TrueNozzle(axis.truth, shift, path, start_s);
+      },
+      machine.axes, base);
   ContourGauge gauge(run.plan, reach_s(machine));
   verify::CornerGauge corners(reach_s(machine));
   double end_s = 0.0;
@@ -78,10 +83,10 @@ RunStraying straying_of(const Machine& machine, double shift, const BaseMotion& 
   RunStraying result;
   for (int k = 0; k * kPrintStep_s <= end_s; ++k) {
     const double t = k * kPrintStep_s;
-    const double x_mm = x.at(t);
-    const double y_mm = y.at(t);
-    corners.sample(t, x_mm, y_mm);
-    const auto reading = gauge.measure(t, x_mm, y_mm);
+    XY at_mm;
+    for_each_axis([&](double& own_mm, TrueNozzle& of) { own_mm = of.at(t); }, at_mm, nozzle);
+    corners.sample(t, at_mm);
+    const auto reading = gauge.measure(t, at_mm);
     if (reading.extruding) {
       result.distances_mm.push_back(reading.distance_mm);
     }
@@ -186,12 +191,14 @@ void MachineBench::add(const std::vector<Run>& runs) {
   std::vector<OfRun> results(runs.size());
   in_parallel(runs.size(), threads(options_), [&](std::size_t i) {
     const Run& run = runs[i];
-    const rivals::AxisPath x = rivals::reference_path(run.plan, gcode::X);
-    const rivals::AxisPath y = rivals::reference_path(run.plan, gcode::Y);
+    const auto references = rivals::on_axes_of(run.plan, rivals::reference_path);
     for (std::size_t c = 0; c < kContenderCount; ++c) {
       const auto contender = static_cast<Contender>(c);
-      BaseMotion base{shaped(contender, machine_.x.shapers, x),
-                      shaped(contender, machine_.y.shapers, y)};
+      BaseMotion base{map_axes(
+          [&](const MachineAxis& axis, const rivals::AxisPath& reference) {
+            return shaped(contender, axis.shapers, reference);
+          },
+          machine_.axes, references)};
       if (contender == Contender::unflex) {
         Result<BaseMotion> solved = unflex_base(machine_.unflex, run.plan, kPrintParts, *engine);
         results[i].failed = !solved;
@@ -215,12 +222,9 @@ void MachineBench::add(const std::vector<Run>& runs) {
 }
 
 MachineResult MachineBench::result() const {
-  MachineResult result{machine_.name,
-                       fmt::format("X {}\nY {}", axis_text(machine_.x, machine_.unflex.x),
-                                   axis_text(machine_.y, machine_.unflex.y)),
-                       {},
-                       0,
-                       measured_->failed_runs};
+  const Axes<std::string> texts = map_axes(axis_text, machine_.axes, machine_.unflex);
+  MachineResult result{
+      machine_.name, fmt::format("X {}\nY {}", texts.x, texts.y), {}, 0, measured_->failed_runs};
   for (std::size_t s = 0; s < kMachineShifts.size(); ++s) {
     for (std::size_t c = 0; c < kContenderCount; ++c) {
       const Measured::Sums& sums = measured_->shifted[s][c];

@@ -16,6 +16,7 @@
 #include "unflex/rivals/thesis_method.hpp"
 #include "unflex/study/bench.hpp"
 #include "unflex_base.hpp"
+#include "values_of.hpp"
 
 namespace unflex::study {
 namespace {
@@ -29,26 +30,37 @@ constexpr double kSplineEndKnots = 5.0;
 
 Result<BaseMotion> shaped_base(const dynamics::Shaper& shaper, const Moves& plan,
                                const compensate::Setup& setup) {
-  const Result<BuiltShaper> x = built_shaper(shaper, setup.x.axis);
-  const Result<BuiltShaper> y = built_shaper(shaper, setup.y.axis);
-  if (!x || !y) {
-    return tl::unexpected(x ? y.error() : x.error());
-  }
-  return BaseMotion{rivals::shaped(rivals::reference_path(plan, gcode::X), x->pulses),
-                    rivals::shaped(rivals::reference_path(plan, gcode::Y), y->pulses),
-                    {},
-                    0,
-                    x->remark.empty() ? y->remark : x->remark};
+  const auto built = map_axes(
+      [&](const compensate::AxisSetup& of) { return built_shaper(shaper, of.axis); }, setup);
+  return values_of(built).map([&](const Axes<BuiltShaper>& shapers) {
+    BaseMotion result{
+        map_axes([](const rivals::AxisPath& reference,
+                    const BuiltShaper& of) { return rivals::shaped(reference, of.pulses); },
+                 rivals::on_axes_of(plan, rivals::reference_path), shapers)};
+    for_each_axis(
+        [&](const BuiltShaper& of) {
+          result.remark = result.remark.empty() ? of.remark : result.remark;
+        },
+        shapers);
+    return result;
+  });
 }
 
 // Makes the base of both axes by a function of an axis's reference and dynamics that solves
 // something.
 template <class Make>
 BaseMotion both_axes(const Moves& plan, const compensate::Setup& setup, const Make& make) {
-  rivals::SolvedPath x = make(rivals::reference_path(plan, gcode::X), setup.x.axis);
-  rivals::SolvedPath y = make(rivals::reference_path(plan, gcode::Y), setup.y.axis);
-  x.size.add(y.size);
-  return {std::move(x.path), std::move(y.path), x.size, x.iterations + y.iterations};
+  BaseMotion result;
+  for_each_axis(
+      [&](rivals::AxisPath& path, const rivals::AxisPath& reference,
+          const compensate::AxisSetup& of) {
+        rivals::SolvedPath solved = make(reference, of.axis);
+        path = std::move(solved.path);
+        result.size.add(solved.size);
+        result.iterations += solved.iterations;
+      },
+      result, rivals::on_axes_of(plan, rivals::reference_path), setup);
+  return result;
 }
 
 rivals::SolvedPath spline(const rivals::AxisPath& reference, const dynamics::FlexibleAxis& axis) {
@@ -59,8 +71,7 @@ rivals::SolvedPath spline(const rivals::AxisPath& reference, const dynamics::Fle
 
 Result<BaseMotion> limited_base(double multiple, compensate::Setup setup, const Moves& plan,
                                 const BenchSetup& bench, const compensate::Engine& engine) {
-  setup.x.limits.max_accel_mm_s2 = multiple * bench.plan_accel_mm_s2;
-  setup.y.limits.max_accel_mm_s2 = multiple * bench.plan_accel_mm_s2;
+  limit_accel(setup, multiple * bench.plan_accel_mm_s2);
   return unflex_base(setup, plan, bench.parts, engine);
 }
 
@@ -97,28 +108,31 @@ std::optional<ShaperMethod> shaper_of(Method method) {
 
 }  // namespace
 
+void limit_accel(compensate::Setup& setup, double accel_mm_s2) {
+  for_each_axis([&](compensate::AxisSetup& axis) { axis.limits.max_accel_mm_s2 = accel_mm_s2; },
+                setup);
+}
+
+dynamics::NozzleXY at_rest(const compensate::Setup& setup, const gcode::Position& place_mm) {
+  return map_axes(
+      [](const compensate::AxisSetup& of, double at_mm) { return of.axis.riding(at_mm); }, setup,
+      xy_of(place_mm));
+}
+
 Result<BaseMotion> unflex_base(const compensate::Setup& setup, const Moves& plan, int parts,
                                const compensate::Engine& engine) {
   const compensate::NodeGrid grid = compensate::node_grid(plan, setup);
   const auto spans = compensate::mesh(plan, grid, setup);
-  const gcode::Position& start = plan.front().segment.start_mm;
-  const dynamics::NozzleXY nozzle{setup.x.axis.riding(start[gcode::X]),
-                                  setup.y.axis.riding(start[gcode::Y])};
-  std::vector<dynamics::AxisTrajectory> x;
-  std::vector<dynamics::AxisTrajectory> y;
+  const dynamics::NozzleXY nozzle = at_rest(setup, plan.front().segment.start_mm);
   BaseMotion result;
   auto windows = compensate::windows(plan, spans, nozzle, setup);
-  for (std::size_t i = 0; i < windows.size(); ++i) {
-    auto [of_x, of_y] = compensate::solve(engine, spans[i], windows[i]);
-    if (!of_x || !of_y) {
-      return tl::unexpected(of_x ? of_y.error() : of_x.error());
-    }
-    for (const compensate::AxisSolution* const of : {&*of_x, &*of_y}) {
-      result.size.add(of->size);
-      result.iterations += of->iterations;
-    }
-    x.push_back(std::move(of_x->base));
-    y.push_back(std::move(of_y->base));
+  const auto first_stage =
+      compensate::solve_all(engine, spans, windows, [&](const compensate::AxisSolution& of) {
+        result.size.add(of.size);
+        result.iterations += of.iterations;
+      });
+  if (!first_stage) {
+    return tl::unexpected(first_stage.error());
   }
   const std::size_t more = compensate::nodes_of_shaping(setup, grid.period_s);
   const auto path = [&](const dynamics::AxisTrajectory& solutions) {
@@ -126,10 +140,10 @@ Result<BaseMotion> unflex_base(const compensate::Setup& setup, const Moves& plan
                                  -setup.lead_in_s - static_cast<double>(more) * grid.period_s,
                                  grid.period_s, parts);
   };
-  const dynamics::BaseTrajectory base = compensate::shaped(
-      {grid.period_s, compensate::join(spans, x), compensate::join(spans, y)}, setup, more, more);
-  result.x = path(base.x);
-  result.y = path(base.y);
+  const dynamics::BaseTrajectory base = compensate::shaped(*first_stage, setup, more, more);
+  for_each_axis([&](rivals::AxisPath& own,
+                    const dynamics::AxisTrajectory& solutions) { own = path(solutions); },
+                result, base);
   return result;
 }
 
@@ -170,13 +184,12 @@ Result<BaseMotion> base_by(Method method, const Run& run, const BenchSetup& setu
   }
   switch (method) {
     case Method::s_curve:
-      return BaseMotion{rivals::s_curve(run.plan, gcode::X), rivals::s_curve(run.plan, gcode::Y)};
+      return BaseMotion{rivals::on_axes_of(run.plan, rivals::s_curve)};
     case Method::slow_s_curve:
       if (run.slow_plan.empty()) {
         return fail(ErrorKind::input, "needs a plan of its own");
       }
-      return BaseMotion{rivals::s_curve(run.slow_plan, gcode::X),
-                        rivals::s_curve(run.slow_plan, gcode::Y)};
+      return BaseMotion{rivals::on_axes_of(run.slow_plan, rivals::s_curve)};
     case Method::filtered_spline:
       return both_axes(run.plan, setup.unflex, &spline);
     case Method::thesis_least_squares:
@@ -198,13 +211,11 @@ Result<BaseMotion> base_by(Method method, const Run& run, const BenchSetup& setu
       return limited_base(4.0, setup.unflex_band, run.plan, setup, engine);
     case Method::first_stage_4x: {
       compensate::Setup first = setup.unflex;
-      first.x.pulses.clear();
-      first.y.pulses.clear();
+      for_each_axis([](compensate::AxisSetup& axis) { axis.pulses.clear(); }, first);
       return limited_base(4.0, std::move(first), run.plan, setup, engine);
     }
     default:
-      return BaseMotion{rivals::reference_path(run.plan, gcode::X),
-                        rivals::reference_path(run.plan, gcode::Y)};
+      return BaseMotion{rivals::on_axes_of(run.plan, rivals::reference_path)};
   }
 }
 

@@ -102,13 +102,15 @@ Result<std::vector<ChainResult>> chains(const std::vector<Case>& cases,
 // The setup as `compensate` makes it for an axis of which only one frequency is given, and that may
 // be off: with the band, a mode that nobody has measured, and freedom along the path.
 compensate::Setup in_band(compensate::Setup setup) {
-  for (compensate::AxisSetup* const of : {&setup.x, &setup.y}) {
-    const compensate::Plant unknown = compensate::with_unknown_mode(of->axis);
-    of->plants = compensate::edges(of->axis, {.freq_error = kBandError}, 1.0 - unknown.share);
-    of->plants.insert(of->plants.begin(), unknown);
-  }
+  for_each_axis(
+      [](compensate::AxisSetup& of) {
+        const compensate::Plant unknown = compensate::with_unknown_mode(of.axis);
+        of.plants = compensate::edges(of.axis, {.freq_error = kBandError}, 1.0 - unknown.share);
+        of.plants.insert(of.plants.begin(), unknown);
+      },
+      setup);
   setup.contour = compensate::Contour{.tracking_jerk_weight = setup.jerk_weight,
-                                      .pairs = compensate::pairs_of(setup.x, setup.y)};
+                                      .pairs = compensate::pairs_of(setup)};
   return setup;
 }
 
@@ -116,7 +118,7 @@ compensate::Setup in_band(compensate::Setup setup) {
 
 BenchSetup corner_setup(const Case& of) {
   BenchSetup setup;
-  setup.unflex.x.axis = setup.unflex.y.axis = of.axis;
+  for_each_axis([&](compensate::AxisSetup& axis) { axis.axis = of.axis; }, setup.unflex);
   setup.unflex.lead_in_s = kLeadIn_s;
   setup.unflex.tail_s =
       std::max(8.0 * of.axis.main_damping_ratio() / of.axis.main_rad_s(), kLeastTail_s);
@@ -163,13 +165,9 @@ Result<Outcome> study_corner(const Options& options, Progress& progress) {
       setup.trace_from_s = -setup.unflex.lead_in_s;
       setup.trace_to_s = planner::duration_s(run.plan) + kTraceTail_s;
       CaseResult& result = outcome.cases[number];
-      result = {std::string(of.name),
-                describe(of),
-                planner::duration_s(run.plan),
-                1,
-                try_all(run, setup, *engine),
-                run.plan.front().segment.end_mm[gcode::X],
-                run.plan.front().segment.end_mm[gcode::Y]};
+      result = {std::string(of.name),          describe(of),
+                planner::duration_s(run.plan), 1,
+                try_all(run, setup, *engine),  xy_of(run.plan.front().segment.end_mm)};
       drop_repeated_traces(of, result.methods);
     }
     const Lock lock(mutex);
@@ -221,12 +219,9 @@ void trace_worst_place(const Run& run, BenchSetup setup, const Options& options,
   for (std::size_t i = 0; i < traced.size(); ++i) {
     result.methods[i].trace = std::move(traced[i].trace);
   }
-  const auto place = [&](gcode::Axis axis) {
-    const rivals::AxisPath path = rivals::reference_path(run.plan, axis);
-    return rivals::PathCursor(path).at(at_s).position;
-  };
-  result.focus_x_mm = place(gcode::X);
-  result.focus_y_mm = place(gcode::Y);
+  result.focus_mm = map_axes(
+      [&](const rivals::AxisPath& path) { return rivals::PathCursor(path).at(at_s).position; },
+      rivals::on_axes_of(run.plan, rivals::reference_path));
 }
 
 }  // namespace unflex::study

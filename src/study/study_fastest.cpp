@@ -190,7 +190,7 @@ Result<study::FastestOutcome> study_fastest(const flow::Job& job,
   PartProgress rest(progress, 1, 2);
   Result<study::FastestOutcome> outcome =
       study_fastest(collector.path, collector.as_sliced,
-                    {.nozzle = {machine::nozzle_x(job.settings), machine::nozzle_y(job.settings)},
+                    {.nozzle = machine::nozzle_axes(job.settings),
                      .tolerances_mm = tolerances_mm,
                      .rule = rule,
                      .workers = job.workers},
@@ -199,8 +199,8 @@ Result<study::FastestOutcome> study_fastest(const flow::Job& job,
     outcome->contenders.push_back(std::move(*unflex));
     outcome->freq_error = job.settings.freq_error();
     outcome->input = job.input_name;
-    outcome->description = fmt::format("X {}; Y {}", job.settings.dynamics_x.description(),
-                                       job.settings.dynamics_y.description());
+    outcome->description = fmt::format("X {}; Y {}", job.settings.dynamics.x.description(),
+                                       job.settings.dynamics.y.description());
     outcome->warnings.insert(outcome->warnings.end(), warnings.begin(), warnings.end());
   }
   return outcome;

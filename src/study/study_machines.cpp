@@ -16,8 +16,7 @@ Result<study::MachinesOutcome> study_machines(const flow::Job& job,
   std::vector<study::MachineBench> benches;
   for (const KnownMachine& known : machines) {
     benches.emplace_back(
-        study::Machine{known.name, known.x, known.y, run::compensate_setup(known.settings)},
-        options);
+        study::Machine{known.name, known.axes, run::compensate_setup(known.settings)}, options);
   }
   const Result<std::vector<Diagnostic>> warnings =
       for_each_batch(job, progress, [&](std::vector<study::Run>&& batch) {

@@ -15,8 +15,8 @@ study::BenchSetup bench_setup(const machine::Settings& settings) {
   machine::Settings in_band = settings;
   in_band.dynamics_error.freq = study::kBandError;
   setup.unflex_band = run::compensate_setup(in_band);
-  if (settings.second.x_freq_hz > 0.0 || settings.second.y_freq_hz > 0.0) {
-    setup.two_stage = study::Nozzle{machine::nozzle_x(settings), machine::nozzle_y(settings)};
+  if (any_axis([](double freq_hz) { return freq_hz > 0.0; }, settings.second.freq_hz)) {
+    setup.two_stage = machine::nozzle_axes(settings);
   }
   setup.plan_accel_mm_s2 = settings.limits.max_accel_mm_s2;
   setup.thesis_period_s = setup.unflex.period_s;
@@ -26,15 +26,18 @@ study::BenchSetup bench_setup(const machine::Settings& settings) {
 }
 
 std::string describe(const machine::Settings& settings) {
-  const auto behind = [](double freq_hz, double damping_ratio) {
-    return freq_hz > 0.0 ? fmt::format(", behind it {:.4g} Hz, ζ {:.3g}", freq_hz, damping_ratio)
-                         : std::string{};
-  };
-  const machine::SecondSettings& second = settings.second;
-  return fmt::format(
-      "X {}{}; Y {}{}; {} mm/s²", settings.dynamics_x.description(),
-      behind(second.x_freq_hz, second.x_damping_ratio), settings.dynamics_y.description(),
-      behind(second.y_freq_hz, second.y_damping_ratio), settings.limits.max_accel_mm_s2);
+  std::string text;
+  for_each_axis(
+      [&](std::string_view letter, const machine::AxisDynamics& axis, double freq_hz,
+          double damping_ratio) {
+        text += fmt::format("{} {}", letter, axis.description());
+        text += freq_hz > 0.0
+                    ? fmt::format(", behind it {:.4g} Hz, ζ {:.3g}", freq_hz, damping_ratio)
+                    : std::string{};
+        text += "; ";
+      },
+      kAxisLetters, settings.dynamics, settings.second.freq_hz, settings.second.damping_ratio);
+  return text + fmt::format("{} mm/s²", settings.limits.max_accel_mm_s2);
 }
 
 }  // namespace

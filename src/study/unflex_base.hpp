@@ -12,4 +12,11 @@ namespace unflex::study {
                                              const std::vector<planner::PlannedMove>& plan,
                                              int parts, const compensate::Engine& engine);
 
+// Lets the base accelerate so much on each axis.
+void limit_accel(compensate::Setup& setup, double accel_mm_s2);
+
+// The nozzle at rest there.
+[[nodiscard]] dynamics::NozzleXY at_rest(const compensate::Setup& setup,
+                                         const gcode::Position& place_mm);
+
 }  // namespace unflex::study

@@ -3,16 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
-namespace unflex::timing {
+#include "unflex/core/xy.hpp"
 
-using gcode::X;
-using gcode::Y;
+namespace unflex::timing {
 
 double corner_speed_mm_s(const planner::PlannedMove& before, const planner::PlannedMove& after,
                          double accel_mm_s2, double tolerance_mm) {
   constexpr double kStraight = 0.999999;
-  const double cosine =
-      -(before.direction[X] * after.direction[X] + before.direction[Y] * after.direction[Y]);
+  const double cosine = -dot(xy_of(before.direction), xy_of(after.direction));
   const double sine = std::sqrt(std::max(0.5 * (1.0 - cosine), 0.0));  // of half the angle
   if (sine > kStraight) {
     return planner::kNoLimit;

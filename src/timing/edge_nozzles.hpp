@@ -15,7 +15,8 @@
 #include "section_motion.hpp"
 #include "section_nodes.hpp"
 #include "section_spline.hpp"
-#include "unflex/core/math.hpp"
+#include "unflex/core/axes.hpp"
+#include "unflex/core/xy.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
 
 namespace unflex::timing {
@@ -41,101 +42,106 @@ class EdgeNozzles {
   [[nodiscard]] const std::vector<dynamics::NozzleXY>& ends() const { return ends_; }
 
   // How far they swing if the base rests there from then on.
-  [[nodiscard]] double largest_swing_mm(Vector base_mm) const {
+  [[nodiscard]] double largest_swing_mm(XY base_mm) const {
     double largest = 0.0;
     for (std::size_t i = 0; i < edges_.size(); ++i) {
-      largest = std::max(largest, math::hypot(swing_mm(edges_[i].x, ends_[i].x, base_mm.x),
-                                              swing_mm(edges_[i].y, ends_[i].y, base_mm.y)));
+      largest = std::max(largest, length(map_axes(swing_mm, edges_[i], ends_[i], base_mm)));
     }
     return largest;
   }
 
   // d of nozzle i at u; 0 before follow().
-  [[nodiscard]] Vector left(std::size_t i, std::size_t k, double x) const {
+  [[nodiscard]] XY left(std::size_t i, std::size_t k, double x) const {
     if (left_.empty()) {
       return {};
     }
     const double look = x * kLooks;
     const auto first = std::min(static_cast<std::size_t>(look), std::size_t{kLooks} - 1);
     const double share = look - static_cast<double>(first);
-    const Vector& a = left_[i][kLooks * k + first];
-    const Vector& b = left_[i][kLooks * k + first + 1];
-    return {a.x + share * (b.x - a.x), a.y + share * (b.y - a.y)};
+    const XY& a = left_[i][kLooks * k + first];
+    const XY& b = left_[i][kLooks * k + first + 1];
+    return a + share * (b - a);
   }
 
   // Factors of the flat outputs for nozzle i, to first order.
-  [[nodiscard]] Derivatives<D> nozzle_x(std::size_t i, const SectionSpline<D>& spline) const {
-    return shifted(spline.x(), edges_[i].off_x);
-  }
-  [[nodiscard]] Derivatives<D> nozzle_y(std::size_t i, const SectionSpline<D>& spline) const {
-    return shifted(spline.y(), edges_[i].off_y);
+  [[nodiscard]] Axes<Derivatives<D>> nozzle(std::size_t i, const SectionSpline<D>& spline) const {
+    const FlatOutputs<D>& flat = spline.flat();
+    return map_axes(shifted, flat.nozzle, flat.sensitivity, edges_[i].off);
   }
 
  private:
-  static Derivatives<D> shifted(const FlatOutput<D>& flat, double off) {
-    Derivatives<D> factors = flat.nozzle;
+  static Derivatives<D> shifted(const Derivatives<D>& nozzle, const Derivatives<D>& sensitivity,
+                                double off) {
+    Derivatives<D> factors = nozzle;
     for (int i = 0; i < D; ++i) {
-      factors[i] += off * flat.sensitivity[i];
+      factors[i] += off * sensitivity[i];
     }
     return factors;
   }
 
   // The base at one look.
-  struct Base {
-    double time_s = 0.0;
-    dynamics::BaseSegment x;
-    dynamics::BaseSegment y;
-  };
+  using Base = Axes<dynamics::BaseSegment>;
 
-  static Base base_at(const SectionSpline<D>& spline, std::size_t k, const SplineShares<D>& shares,
-                      const typename SectionSpline<D>::Place& at) {
+  static Base base_at(const SectionSpline<D>& spline, const typename SectionSpline<D>::Place& at) {
     using Spline = SectionSpline<D>;
     const double h = spline.period_s();
-    const Vector place = Spline::apply(spline.x().base, spline.y().base, at);
-    const Vector speed = Spline::apply(spline.x().base_speed, spline.y().base_speed, at);
-    const Vector accel = Spline::apply(spline.x().base_accel, spline.y().base_accel, at);
-    return {spline.clock(k, shares) * h,
-            {spline.origin().x + place.x, speed.x / h, accel.x / (h * h)},
-            {spline.origin().y + place.y, speed.y / h, accel.y / (h * h)}};
+    const FlatOutputs<D>& flat = spline.flat();
+    return map_axes(
+        [](double place, double speed, double accel) {
+          return dynamics::BaseSegment{place, speed, accel};
+        },
+        spline.origin() + Spline::apply(flat.base, at), Spline::apply(flat.base_speed, at) / h,
+        Spline::apply(flat.base_accel, at) / (h * h));
   }
 
   dynamics::NozzleXY follow(const SectionSpline<D>& spline, std::size_t i) {
     const SectionEdge& edge = edges_[i];
     dynamics::NozzleXY nozzle;
-    const Vector origin = spline.origin();
+    const XY origin = spline.origin();
     Base last;
-    const Derivatives<D> of_x = shifted(spline.x(), edge.off_x);
-    const Derivatives<D> of_y = shifted(spline.y(), edge.off_y);
+    double last_s = 0.0;
+    const Axes<Derivatives<D>> of_edge = this->nozzle(i, spline);
     for (std::size_t look = 0; look <= kLooks * spline.periods(); ++look) {
       const std::size_t k = std::min(look / kLooks, spline.periods() - 1);
       const SplineShares<D>& shares = kSharesAtLooks<D>[look - kLooks * k];
       const auto at = spline.place(k, shares);
-      const Base now = base_at(spline, k, shares, at);
-      const Vector foreseen = SectionSpline<D>::apply(of_x, of_y, at);
+      const Base now = base_at(spline, at);
+      const double now_s = spline.clock(k, shares) * spline.period_s();
+      const XY foreseen = SectionSpline<D>::apply(of_edge, at);
       if (look == 0) {
-        nozzle = start(i, now, foreseen, origin);
+        nozzle = start(i, now, origin + foreseen);
       } else {
-        const double step_s = now.time_s - last.time_s;
-        nozzle.x = dynamics::exact_step(edge.x, nozzle.x, between(last.x, now.x), step_s);
-        nozzle.y = dynamics::exact_step(edge.y, nozzle.y, between(last.y, now.y), step_s);
+        const double step_s = now_s - last_s;
+        for_each_axis(
+            [&](dynamics::NozzleState& state, const dynamics::FlexibleAxis& axis,
+                const dynamics::BaseSegment& from, const dynamics::BaseSegment& to) {
+              state = dynamics::exact_step(axis, state, between(from, to), step_s);
+            },
+            nozzle, edge, last, now);
       }
-      left_[i].push_back({nozzle.x.position() - origin.x - foreseen.x,
-                          nozzle.y.position() - origin.y - foreseen.y});
+      left_[i].push_back(dynamics::place_mm(nozzle) - origin - foreseen);
       last = now;
+      last_s = now_s;
     }
     return nozzle;
   }
 
-  [[nodiscard]] dynamics::NozzleXY start(std::size_t i, const Base& base, Vector foreseen,
-                                         Vector origin) const {
+  [[nodiscard]] dynamics::NozzleXY start(std::size_t i, const Base& base,
+                                         const XY& foreseen_mm) const {
     if (!section_.edge_nozzles.empty()) {
       return section_.edge_nozzles[i];
     }
-    dynamics::NozzleXY nozzle{edges_[i].x.riding(base.x.position, base.x.velocity),
-                              edges_[i].y.riding(base.y.position, base.y.velocity)};
+    dynamics::NozzleXY nozzle = map_axes(
+        [](const dynamics::FlexibleAxis& axis, const dynamics::BaseSegment& of_axis) {
+          return axis.riding(of_axis.position, of_axis.velocity);
+        },
+        edges_[i], base);
     if (section_.nozzle) {
-      nozzle.x.parts[0] = {origin.x + foreseen.x, section_.nozzle->x.velocity};
-      nozzle.y.parts[0] = {origin.y + foreseen.y, section_.nozzle->y.velocity};
+      for_each_axis(
+          [](dynamics::NozzleState& state, double place_mm, const dynamics::NozzleMotion& swing) {
+            state.parts[0] = {place_mm, swing.velocity};
+          },
+          nozzle, foreseen_mm, *section_.nozzle);
     }
     return nozzle;
   }
@@ -148,7 +154,7 @@ class EdgeNozzles {
   const Section& section_;
   std::vector<SectionEdge> edges_;
   std::vector<dynamics::NozzleXY> ends_;
-  std::vector<std::vector<Vector>> left_;  // of each edge, kLooks times per period
+  std::vector<std::vector<XY>> left_;  // of each edge, kLooks times per period
 };
 
 }  // namespace unflex::timing

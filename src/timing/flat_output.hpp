@@ -56,4 +56,25 @@ FlatOutput<K> flat_output(const dynamics::Mode& mode, double unit_s) {
   return flat;
 }
 
+// Each of them for all axes.
+template <int K>
+struct FlatOutputs {
+  Axes<Derivatives<K>> nozzle;
+  Axes<Derivatives<K>> nozzle_speed;
+  Axes<Derivatives<K>> base;
+  Axes<Derivatives<K>> base_speed;
+  Axes<Derivatives<K>> base_accel;
+  Axes<Derivatives<K>> sensitivity;
+};
+
+template <int K>
+FlatOutputs<K> of_all_axes(const Axes<FlatOutput<K>>& flat) {
+  const auto each = [&](Derivatives<K> FlatOutput<K>::*which) {
+    return map_axes([&](const FlatOutput<K>& of_axis) { return of_axis.*which; }, flat);
+  };
+  using Flat = FlatOutput<K>;
+  return {each(&Flat::nozzle),     each(&Flat::nozzle_speed), each(&Flat::base),
+          each(&Flat::base_speed), each(&Flat::base_accel),   each(&Flat::sensitivity)};
+}
+
 }  // namespace unflex::timing

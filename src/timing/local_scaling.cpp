@@ -32,9 +32,6 @@
 namespace unflex::timing {
 namespace {
 
-using gcode::X;
-using gcode::Y;
-
 // Rounds in which limits may rise, at least and at most, and those in which they are lowered only.
 constexpr int kLeastRounds = 3;
 constexpr int kRounds = 10;
@@ -111,7 +108,8 @@ class LocalScaling {
         engine_(engine),
         extruder_(extruder),
         models_(models_of(setup)),
-        omega_rad_s_(std::min(setup.x.axis.slowest_rad_s(), setup.y.axis.slowest_rad_s())) {
+        omega_rad_s_(least_of_axes(
+            [](const compensate::AxisSetup& axis) { return axis.axis.slowest_rad_s(); }, setup)) {
     std::vector<double> ends_s;
     for (const double end : ends) {
       ends_s.push_back(end / omega_rad_s_);
@@ -171,7 +169,7 @@ class LocalScaling {
         const double gain_s = least_s - plan_s;
         if (gain_s > 0.0) {
           least_s -= gain_s;
-          best = Timed{plan, pieces_.counts, {}, Plants{setup_.x.plants, setup_.y.plants}};
+          best = Timed{plan, pieces_.counts, {}, plants()};
         }
         if (repairs || (best && gain_s < kGain * least_s)) {
           break;
@@ -215,14 +213,16 @@ class LocalScaling {
     }
   }
 
+  [[nodiscard]] Plants plants() const {
+    return map_axes([](const compensate::AxisSetup& axis) { return axis.plants; }, setup_);
+  }
+
   void limit_accel() {
     const double limit = setup_.x.limits.max_accel_mm_s2;
     for (std::size_t i = 0; i < pieces_.moves.size(); ++i) {
-      const gcode::Position& direction = pieces_.moves[i].direction;
-      const double x = std::abs(direction[X]);
-      const double y = std::abs(direction[Y]);
+      const XY direction = xy_of(pieces_.moves[i].direction);
       double& accel = pieces_.bounds[i].accel_mm_s2;
-      accel = std::min(accel, limit / (setup_.shares_motors ? x + y : std::max(x, y)));
+      accel = std::min(accel, limit / asked_of_motors(direction, setup_.shares_motors));
     }
   }
 
@@ -296,24 +296,16 @@ class LocalScaling {
     const std::vector<compensate::WindowSpan> spans = compensate::mesh(course, grid, setup_);
     std::vector<compensate::RunWindow> windows =
         compensate::windows(course, spans, nozzle_, setup_);
-    std::vector<dynamics::AxisTrajectory> x;
-    std::vector<dynamics::AxisTrajectory> y;
-    for (std::size_t i = 0; i < windows.size(); ++i) {
-      auto [of_x, of_y] = compensate::solve(engine_, spans[i], windows[i]);
-      if (!of_x || !of_y) {
-        return std::nullopt;
-      }
-      x.push_back(std::move(of_x->base));
-      y.push_back(std::move(of_y->base));
+    const Result<dynamics::BaseTrajectory> base = compensate::solve_all(engine_, spans, windows);
+    if (!base) {
+      return std::nullopt;
     }
     period_s_ = grid.period_s;
     starts_s_ = {compensate::origin_s(course, grid, setup_)};
     for (const planner::PlannedMove& move : plan) {
       starts_s_.push_back(starts_s_.back() + move.duration_s());
     }
-    const dynamics::BaseTrajectory base{grid.period_s, compensate::join(spans, x),
-                                        compensate::join(spans, y)};
-    NozzleMeasure measured = measure(plan, bounds, starts_s_, base, models_, allowances_,
+    NozzleMeasure measured = measure(plan, bounds, starts_s_, *base, models_, allowances_,
                                      course.before.empty() ? &nozzle_ : nullptr, extruder_);
     if (!course.after.empty() || goal_ == Goal::feed) {
       measured.left.assign(models_.size(), 0.0);

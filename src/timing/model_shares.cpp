@@ -11,9 +11,6 @@
 namespace unflex::timing {
 namespace {
 
-using gcode::X;
-using gcode::Y;
-
 // The power mean of the errors on the pieces is what is compared.
 constexpr double kPower = 4.0;
 // A model of twice the mean error gets so many powers of 2 more.
@@ -45,7 +42,11 @@ std::vector<double> errors_along(gcode::Axis along, const NozzleMeasure& measure
 }  // namespace
 
 ModelShares::ModelShares(const compensate::Setup& setup)
-    : x_{setup.x.plants, {}}, y_{setup.y.plants, {}} {}
+    : axes_(map_axes(
+          [](const compensate::AxisSetup& axis) {
+            return OfAxis{axis.plants, {}};
+          },
+          setup)) {}
 
 void ModelShares::follow(const NozzleMeasure& measured,
                          std::span<const planner::PlannedMove> pieces, const Allowances& allowances,
@@ -53,10 +54,13 @@ void ModelShares::follow(const NozzleMeasure& measured,
   if (measured.of_pieces.size() < 2) {
     return;
   }
-  adapt(errors_along(Y, measured, pieces, allowances), x_.factors);
-  adapt(errors_along(X, measured, pieces, allowances), y_.factors);
-  setup.x.plants = plants_of(x_);
-  setup.y.plants = plants_of(y_);
+  constexpr Axes<gcode::Axis> kOther{gcode::Y, gcode::X};
+  for_each_axis(
+      [&](OfAxis& own, compensate::AxisSetup& axis, gcode::Axis other) {
+        adapt(errors_along(other, measured, pieces, allowances), own.factors);
+        axis.plants = plants_of(own);
+      },
+      axes_, setup, kOther);
 }
 
 void ModelShares::adapt(const std::vector<double>& errors, std::vector<double>& factors) {

@@ -36,8 +36,7 @@ class ModelShares {
   static void adapt(const std::vector<double>& errors, std::vector<double>& factors);
   static std::vector<compensate::Plant> plants_of(const OfAxis& axis);
 
-  OfAxis x_;
-  OfAxis y_;
+  Axes<OfAxis> axes_;
 };
 
 }  // namespace unflex::timing

@@ -7,12 +7,10 @@
 
 #include "laid_width.hpp"
 #include "unflex/core/math.hpp"
+#include "unflex/core/xy.hpp"
 
 namespace unflex::timing {
 namespace {
-
-using gcode::X;
-using gcode::Y;
 
 // A nozzle that passes a corner is nearest to it, or farthest from the path, for less than a node
 // period. So we look several times per node.
@@ -61,8 +59,7 @@ class Walk {
     for (const planner::PlannedMove& move : plan) {
       from_mm_.push_back(from_mm_.back() + move.length_mm);
       filament_mm_.push_back(filament_mm_.back() + move.length_mm * filament_per_mm(move));
-      const double flat2 =
-          move.direction[X] * move.direction[X] + move.direction[Y] * move.direction[Y];
+      const double flat2 = squared(xy_of(move.direction));
       inverse_flat2_.push_back(flat2 > 0.0 ? 1.0 / flat2 : 0.0);
     }
   }
@@ -85,8 +82,7 @@ class Walk {
 
   // What all nozzles share between two looks.
   struct Look {
-    dynamics::BaseSegment x;
-    dynamics::BaseSegment y;
+    Axes<dynamics::BaseSegment> base;
     // At its end: the piece that the plan is on, and where on the path that is. nullopt: the plan
     // has not begun, or has ended.
     std::optional<std::size_t> now;
@@ -99,8 +95,9 @@ class Walk {
     for (std::size_t node = first_node; node < last_node; ++node) {
       for (int i = 0; i < kLooks; ++i) {
         Look& look = looks.emplace_back();
-        look.x = segment_of(base_.x, node, i, h);
-        look.y = segment_of(base_.y, node, i, h);
+        look.base = map_axes(
+            [&](const dynamics::AxisTrajectory& axis) { return segment_of(axis, node, i, h); },
+            base_);
         const double t = (static_cast<double>(node) + (i + 1.0) / kLooks) * h;
         if (t < starts_s_.front() || t > starts_s_.back()) {
           continue;
@@ -124,10 +121,13 @@ class Walk {
           model_(&model),
           allowance_(allowance),
           laid_(laid),
-          map_x_(model.x, walk.base_.period_s / kLooks),
-          map_y_(model.y, walk.base_.period_s / kLooks),
+          maps_(map_axes(
+              [&](const dynamics::FlexibleAxis& axis) {
+                return dynamics::ExactMap(axis, walk.base_.period_s / kLooks);
+              },
+              model)),
           nozzle_(start),
-          last_(start.motion()),
+          last_mm_(dynamics::place_mm(start)),
           nodes_(1),
           of_pieces_(walk.plan_.size(), 0.0) {
       note_laid();
@@ -140,8 +140,9 @@ class Walk {
           nodes_.emplace_back();
         }
         const Look& look = looks[i];
-        map_x_.advance(look.x, nozzle_.x);
-        map_y_.advance(look.y, nozzle_.y);
+        for_each_axis([](const dynamics::ExactMap& map, const dynamics::BaseSegment& base,
+                         dynamics::NozzleState& nozzle) { map.advance(base, nozzle); },
+                      maps_, look.base, nozzle_);
         if (look.now) {
           see(*look.now, look.reference_mm);
         }
@@ -155,31 +156,32 @@ class Walk {
     // may_be_left: the swing in the end that counts as 1, relative to the tolerance.
     void end(double may_be_left, NozzleMeasure& result) {
       settle(nodes_.size(), result);
-      const double left_mm =
-          math::hypot(swing_mm(model_->x, nozzle_.x, walk_->base_.x.position_mm.back()),
-                      swing_mm(model_->y, nozzle_.y, walk_->base_.y.position_mm.back()));
+      const double left_mm = length(map_axes(
+          [](const dynamics::FlexibleAxis& axis, const dynamics::NozzleState& nozzle,
+             const dynamics::AxisTrajectory& base) {
+            return swing_mm(axis, nozzle, base.position_mm.back());
+          },
+          *model_, nozzle_, walk_->base_));
       result.left.push_back(left_mm / (may_be_left * walk_->bounds_.back().tolerance_mm));
       result.of_pieces.push_back(std::move(of_pieces_));
     }
 
    private:
     void see(std::size_t now, double reference_mm) {
-      const dynamics::NozzleMotionXY at = nozzle_.motion();
-      const double speed_mm_s =
-          std::sqrt(at.x.velocity * at.x.velocity + at.y.velocity * at.y.velocity);
+      const XY at_mm = dynamics::place_mm(nozzle_);
+      const XY velocity_mm_s =
+          map_axes([](const dynamics::NozzleState& nozzle) { return nozzle.velocity(); }, nozzle_);
+      const double speed_mm_s = std::sqrt(squared(velocity_mm_s));
       const std::size_t last_piece = furthest_.piece;
-      const Place ahead = walk_->place(now, at.x.position, at.y.position, reference_mm);
+      const Place ahead = walk_->place(now, at_mm, reference_mm);
       if (ahead.piece != last_piece) {
         // The error may be largest where the piece changes.
         for (const double share : kBetweenLooks) {
-          take(walk_->place(now, last_.x.position + share * (at.x.position - last_.x.position),
-                            last_.y.position + share * (at.y.position - last_.y.position),
-                            reference_mm),
-               speed_mm_s);
+          take(walk_->place(now, last_mm_ + share * (at_mm - last_mm_), reference_mm), speed_mm_s);
         }
       }
       take(ahead, speed_mm_s);
-      last_ = at;
+      last_mm_ = at_mm;
     }
 
     void take(Place found, double speed_mm_s) {
@@ -217,10 +219,9 @@ class Walk {
     const AxesModel* model_;
     std::span<const double> allowance_;
     Laid* laid_;
-    dynamics::ExactMap map_x_;
-    dynamics::ExactMap map_y_;
+    Axes<dynamics::ExactMap> maps_;
     dynamics::NozzleXY nozzle_;
-    dynamics::NozzleMotionXY last_;
+    XY last_mm_;
     Place furthest_;
     std::vector<AtNode> nodes_;  // from the first_ on
     std::size_t first_ = 0;
@@ -231,21 +232,16 @@ class Walk {
  private:
   // Filament is laid up to the nearest place. Where the path comes back to itself, as travel does
   // along what was just laid, that is the one nearer to the reference, which is on the piece `now`.
-  [[nodiscard]] Place place(std::size_t now, double x_mm, double y_mm, double reference_mm) const {
+  [[nodiscard]] Place place(std::size_t now, const XY& at_mm, double reference_mm) const {
     double nearest2 = std::numeric_limits<double>::infinity();
     double least = std::numeric_limits<double>::infinity();
     Place found;
     const auto look_at = [&](std::size_t i) {
-      const gcode::Segment& segment = plan_[i].segment;
-      const double dx = plan_[i].direction[X];
-      const double dy = plan_[i].direction[Y];
-      const double px = x_mm - segment.start_mm[X];
-      const double py = y_mm - segment.start_mm[Y];
+      const XY direction = xy_of(plan_[i].direction);
+      const XY from_start = at_mm - xy_of(plan_[i].segment.start_mm);
       const double along =
-          std::clamp((px * dx + py * dy) * inverse_flat2_[i], 0.0, plan_[i].length_mm);
-      const double across_x = px - along * dx;
-      const double across_y = py - along * dy;
-      const double distance2 = across_x * across_x + across_y * across_y;
+          std::clamp(dot(from_start, direction) * inverse_flat2_[i], 0.0, plan_[i].length_mm);
+      const double distance2 = squared(from_start - along * direction);
       const double ahead_mm = from_mm_[i] + along - reference_mm;
       const double cost = distance2 + kTowardsReference * ahead_mm * ahead_mm;
       nearest2 = std::min(nearest2, distance2);
@@ -305,8 +301,9 @@ class Walk {
     result.error[k] = std::max(result.error[k], node.error_mm / tolerance_mm);
     if (times_tolerance == 1.0) {
       // In travel the base keeps F as well, since its motors are what F is for there.
-      const double of_travel_mm_s = std::max(
-          node.speed_mm_s, math::hypot(base_.x.velocity_mm_s[k], base_.y.velocity_mm_s[k]));
+      const XY of_base_mm_s = map_axes(
+          [&](const dynamics::AxisTrajectory& axis) { return axis.velocity_mm_s[k]; }, base_);
+      const double of_travel_mm_s = std::max(node.speed_mm_s, length(of_base_mm_s));
       result.speed[k] = std::max(
           {result.speed[k], node.speed_mm_s / node.feed_mm_s, of_travel_mm_s / node.travel_mm_s});
     }
@@ -335,8 +332,9 @@ std::vector<AxesModel> models_of(const compensate::Setup& setup) {
     dynamics::FlexibleAxis axis;
     double times_tolerance = 1.0;
   };
-  const auto of = [](const compensate::AxisSetup& axis) {
-    std::vector<Model> models = {{axis.axis}};
+  using Models = std::vector<Model>;
+  const auto of_axis = [](const compensate::AxisSetup& axis) {
+    Models models = {{axis.axis}};
     for (const compensate::Plant& plant : axis.plants) {
       if (is_model(plant)) {
         models.push_back({plant.axis, plant.is_edge ? kTimesAtEdge : 1.0});
@@ -344,13 +342,14 @@ std::vector<AxesModel> models_of(const compensate::Setup& setup) {
     }
     return models;
   };
-  const std::vector<Model> x = of(setup.x);
-  const std::vector<Model> y = of(setup.y);
+  const Axes<Models> all = map_axes(of_axis, setup);
   std::vector<AxesModel> models;
-  for (std::size_t i = 0; i < std::max(x.size(), y.size()); ++i) {
-    const Model& of_x = x[i < x.size() ? i : 0];
-    const Model& of_y = y[i < y.size() ? i : 0];
-    models.push_back({of_x.axis, of_y.axis, std::max(of_x.times_tolerance, of_y.times_tolerance)});
+  const std::size_t count = most_of_axes([](const Models& each) { return each.size(); }, all);
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto model =
+        map_axes([&](const Models& each) { return each[i < each.size() ? i : 0]; }, all);
+    models.push_back({map_axes([](const Model& each) { return each.axis; }, model),
+                      most_of_axes([](const Model& each) { return each.times_tolerance; }, model)});
   }
   return models;
 }
@@ -365,17 +364,23 @@ NozzleMeasure measure(std::span<const planner::PlannedMove> plan,
   result.width.assign(base.nodes(), 0.0);
   result.speed.assign(base.nodes(), 0.0);
   Walk walk(plan, bounds, starts_s, base);
-  const dynamics::AxisMotion x = base.x_at(0.0);
-  const dynamics::AxisMotion y = base.y_at(0.0);
+  const Axes<dynamics::AxisMotion> begin = base.at(0.0);
   Walk::Laid laid;
   std::vector<Walk::Nozzle> nozzles;
   for (std::size_t m = 0; m < models.size(); ++m) {
     const AxesModel& model = models[m];
-    dynamics::NozzleXY start{model.x.riding(x.position_mm, x.velocity_mm_s),
-                             model.y.riding(y.position_mm, y.velocity_mm_s)};
+    dynamics::NozzleXY start = map_axes(
+        [](const dynamics::FlexibleAxis& axis, const dynamics::AxisMotion& at) {
+          return axis.riding(at.position_mm, at.velocity_mm_s);
+        },
+        model, begin);
     if (nozzle != nullptr) {
-      start = {model.x.swinging_as(models.front().x, nozzle->x, x.position_mm),
-               model.y.swinging_as(models.front().y, nozzle->y, y.position_mm)};
+      start = map_axes(
+          [](const dynamics::FlexibleAxis& axis, const dynamics::FlexibleAxis& first,
+             const dynamics::NozzleState& state, const dynamics::AxisMotion& at) {
+            return axis.swinging_as(first, state, at.position_mm);
+          },
+          model, models.front(), *nozzle, begin);
     }
     nozzles.emplace_back(walk, model, start,
                          allowances.empty() ? std::span<const double>{} : allowances[m],

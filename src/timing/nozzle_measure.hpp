@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "unflex/compensate/run.hpp"
+#include "unflex/core/axes.hpp"
 #include "unflex/dynamics/base_trajectory.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
 #include "unflex/planner/planner.hpp"
@@ -28,9 +29,7 @@ inline constexpr double kLeastShare = 0.05;
 }
 
 // Models of both axes.
-struct AxesModel {
-  dynamics::FlexibleAxis x;
-  dynamics::FlexibleAxis y;
+struct AxesModel : Axes<dynamics::FlexibleAxis> {
   double times_tolerance = 1.0;  // how many tolerances its nozzle may stray
 };
 

@@ -12,9 +12,6 @@
 namespace unflex::timing {
 namespace {
 
-using gcode::X;
-using gcode::Y;
-
 // How long before and after it even motion is settled, in 1/ω.
 constexpr double kSettling = 9.0;
 // Travel that wanders may come too near to what is laid next, and a first plan that is too quick
@@ -26,15 +23,19 @@ std::optional<SectionRules> rules_of(const compensate::Setup& setup) {
   SectionRules rules;
   rules.max_accel_mm_s2 = setup.x.limits.max_accel_mm_s2;
   rules.shares_motors = setup.shares_motors;
-  if (setup.x.axis.mode_count() != 1 || setup.y.axis.mode_count() != 1) {
+  if (any_axis([](const compensate::AxisSetup& axis) { return axis.axis.mode_count() != 1; },
+               setup)) {
     return std::nullopt;
   }
-  rules.limits_x = setup.x.limits;
-  rules.limits_y = setup.y.limits;
-  rules.x = setup.x.axis.main();
-  rules.y = setup.y.axis.main();
+  for_each_axis(
+      [](dynamics::Mode& mode, compensate::BaseLimits& limits, const compensate::AxisSetup& axis) {
+        mode = axis.axis.main();
+        limits = axis.limits;
+      },
+      rules, rules.limits, setup);
+  using Edges = std::vector<dynamics::FlexibleAxis>;
   const auto edges_of = [](const compensate::AxisSetup& axis) {
-    std::vector<dynamics::FlexibleAxis> edges;
+    Edges edges;
     for (const compensate::Plant& plant : axis.plants) {
       if (is_model(plant) && plant.is_edge) {
         edges.push_back(plant.axis);
@@ -47,18 +48,21 @@ std::optional<SectionRules> rules_of(const compensate::Setup& setup) {
       return !is_model(plant) || (plant.is_edge && plant.axis.mode_count() == 1);
     });
   };
-  if (!knows(setup.x) || !knows(setup.y)) {
+  if (!all_axes(knows, setup)) {
     return std::nullopt;
   }
-  const std::vector<dynamics::FlexibleAxis> x = edges_of(setup.x);
-  const std::vector<dynamics::FlexibleAxis> y = edges_of(setup.y);
+  const Axes<Edges> edges = map_axes(edges_of, setup);
+  const auto size = [](const Edges& of_axis) { return of_axis.size(); };
   // Paired as in models_of().
-  for (std::size_t i = 0; i < std::max(x.size(), y.size()); ++i) {
+  for (std::size_t i = 0; i < most_of_axes(size, edges); ++i) {
     SectionEdge& edge = rules.edges.emplace_back();
-    edge.x = i < x.size() ? x[i] : setup.x.axis;
-    edge.y = i < y.size() ? y[i] : setup.y.axis;
-    edge.off_x = edge.x.main_rad_s() / rules.x.omega_rad_s - 1.0;
-    edge.off_y = edge.y.main_rad_s() / rules.y.omega_rad_s - 1.0;
+    for_each_axis(
+        [&](dynamics::FlexibleAxis& own, double& off, const Edges& of_axis,
+            const compensate::AxisSetup& given, const dynamics::Mode& mode) {
+          own = i < of_axis.size() ? of_axis[i] : given.axis;
+          off = own.main_rad_s() / mode.omega_rad_s - 1.0;
+        },
+        edge, edge.off, edges, setup, rules);
   }
   rules.times_tolerance = kTimesAtEdge;
   return rules;
@@ -67,9 +71,12 @@ std::optional<SectionRules> rules_of(const compensate::Setup& setup) {
 bool is_at_rest(const dynamics::NozzleXY& nozzle, const gcode::Position& at_mm,
                 const compensate::Setup& setup) {
   constexpr double kNothing_mm = 1e-4;
-  const dynamics::FlexibleAxis::Gap x = setup.x.axis.gap(nozzle.x, setup.x.axis.riding(at_mm[X]));
-  const dynamics::FlexibleAxis::Gap y = setup.y.axis.gap(nozzle.y, setup.y.axis.riding(at_mm[Y]));
-  return std::max({x.place_mm, x.speed_mm, y.place_mm, y.speed_mm}) <= kNothing_mm;
+  return all_axes(
+      [](const dynamics::NozzleState& state, double place_mm, const compensate::AxisSetup& given) {
+        const dynamics::FlexibleAxis::Gap gap = given.axis.gap(state, given.axis.riding(place_mm));
+        return std::max(gap.place_mm, gap.speed_mm) <= kNothing_mm;
+      },
+      nozzle, xy_of(at_mm), setup);
 }
 
 // A part of the run in its new timing.
@@ -125,14 +132,17 @@ SectionMotion::Base base_at(const std::vector<TimedPart>& parts, const gcode::Po
   }
   const TimedPart& part = parts[i];
   if (t <= 0.0 || !part.motion) {
-    return {{start_mm[X]}, {start_mm[Y]}};
+    return map_axes([](double place_mm) { return SectionMotion::OfAxis{place_mm}; },
+                    xy_of(start_mm));
   }
   if (t < part.pause_begin_s()) {
     return part.motion->base(t - part.begin_s);
   }
   const SectionMotion::Base from = part.motion->base(part.motion->duration_s());
   const double since_s = t - part.pause_begin_s();
-  return {even(from.x, part.pause->x_mm_s, since_s), even(from.y, part.pause->y_mm_s, since_s)};
+  return map_axes([&](const SectionMotion::OfAxis& of_axis,
+                      double speed_mm_s) { return even(of_axis, speed_mm_s, since_s); },
+                  from, part.pause->velocity_mm_s);
 }
 
 // The smoothest motion through these places that has no speed at both ends: b̈ is linear between
@@ -172,12 +182,14 @@ std::vector<dynamics::NozzleXY> after(const Pause& pause, const SectionMotion& m
                                       const SectionRules& rules) {
   std::vector<dynamics::NozzleXY> nozzles = motion.edge_nozzles();
   const SectionMotion::Base base = motion.base(motion.duration_s());
-  const dynamics::BaseSegment x{base.x.position_mm, pause.x_mm_s};
-  const dynamics::BaseSegment y{base.y.position_mm, pause.y_mm_s};
   for (std::size_t i = 0; i < nozzles.size(); ++i) {
-    const SectionEdge& edge = rules.edges[i];
-    nozzles[i].x = dynamics::exact_step(edge.x, nozzles[i].x, x, pause.duration_s);
-    nozzles[i].y = dynamics::exact_step(edge.y, nozzles[i].y, y, pause.duration_s);
+    for_each_axis(
+        [&](dynamics::NozzleState& nozzle, const dynamics::FlexibleAxis& axis,
+            const SectionMotion::OfAxis& from, double speed_mm_s) {
+          nozzle =
+              dynamics::exact_step(axis, nozzle, {from.position_mm, speed_mm_s}, pause.duration_s);
+        },
+        nozzles[i], rules.edges[i], base, pause.velocity_mm_s);
   }
   return nozzles;
 }
@@ -214,16 +226,20 @@ double within_by_a_hair(double base_mm, const compensate::BaseLimits& limits) {
 dynamics::BaseTrajectory base_on(const compensate::NodeGrid& grid,
                                  const std::vector<TimedPart>& parts,
                                  const gcode::Position& start_mm, const compensate::Setup& setup) {
-  std::vector<double> x_mm;
-  std::vector<double> y_mm;
+  Axes<std::vector<double>> places_mm;
   for (std::size_t k = 0; k < grid.count; ++k) {
     const double t = static_cast<double>(k) * grid.period_s - setup.lead_in_s;
     const SectionMotion::Base at = base_at(parts, start_mm, t);
-    x_mm.push_back(within_by_a_hair(at.x.position_mm, setup.x.limits));
-    y_mm.push_back(within_by_a_hair(at.y.position_mm, setup.y.limits));
+    for_each_axis(
+        [](std::vector<double>& all_mm, const auto& base, const compensate::AxisSetup& axis) {
+          all_mm.push_back(within_by_a_hair(base.position_mm, axis.limits));
+        },
+        places_mm, at, setup);
   }
-  return {grid.period_s, through(std::move(x_mm), grid.period_s),
-          through(std::move(y_mm), grid.period_s)};
+  return {
+      map_axes([&](const std::vector<double>& all_mm) { return through(all_mm, grid.period_s); },
+               places_mm),
+      grid.period_s};
 }
 
 // What the motion breaks when the base moves so; nullptr: nothing. A single place that is a little
@@ -256,7 +272,8 @@ tl::expected<Timed, std::string> optimal_from(
     const FirstPlan& first, const compensate::Course& course, const compensate::Setup& setup,
     const SectionRules& rules, const dynamics::NozzleXY& nozzle, std::span<const MoveBounds> bounds,
     const std::optional<Extruder>& extruder) {
-  const double slowest_rad_s = std::min(rules.x.omega_rad_s, rules.y.omega_rad_s);
+  const double slowest_rad_s =
+      least_of_axes([](const dynamics::Mode& mode) { return mode.omega_rad_s; }, rules);
   auto parts = sections(course.moves, bounds, setup, kSettling / slowest_rad_s, first);
   if (!parts) {
     return tl::unexpected<std::string>("accelerations along the path are limited");
@@ -264,7 +281,7 @@ tl::expected<Timed, std::string> optimal_from(
   const gcode::Position& start_mm = course.moves.front().segment.start_mm;
   if (Section& section = parts->front().section;
       !section.legs.empty() && !is_at_rest(nozzle, start_mm, setup)) {
-    section.nozzle = nozzle.motion();
+    section.nozzle = dynamics::motion(nozzle);
   }
   const std::optional<Motion> motion = fastest(*parts, rules);
   if (!motion) {

@@ -24,6 +24,7 @@
 #include <optional>
 #include <span>
 
+#include "bounded_plan.hpp"
 #include "edge_nozzles.hpp"
 #include "section_nodes.hpp"
 #include "section_rounds.hpp"
@@ -53,6 +54,9 @@ constexpr double kTimesForTrust = 100.0;
 constexpr double kLeastClock = 0.3;
 // Nodes below this share of F have no row for it.
 constexpr double kNearFeed = 0.3;
+// Directions in which motors move the base.
+constexpr Axes<XY> kAlongAxes{{1.0, 0.0}, {0.0, 1.0}};
+constexpr Axes<XY> kAlongMotors{{1.0, 1.0}, {1.0, -1.0}};
 constexpr double kFacet_rad = 0.3;
 constexpr double kAlong_rad = 0.1;
 // The last periods of a section, in which its end gives the base and its clock.
@@ -87,7 +91,10 @@ class Program {
       : section_(section),
         legs_(section.legs),
         rules_(rules),
-        nodes_(section, kNodePeriod / std::max(rules.x.omega_rad_s, rules.y.omega_rad_s)),
+        nodes_(
+            section,
+            kNodePeriod /
+                most_of_axes([](const dynamics::Mode& mode) { return mode.omega_rad_s; }, rules)),
         spline_(section, rules, nodes_),
         edges_(section, rules),
         rounds_(nodes_.periods(), D != 5) {
@@ -213,7 +220,7 @@ class Program {
     std::size_t k = 0;
     const Shares* shares = nullptr;
     bool is_base = false;  // b̈; the nozzle's place otherwise
-    Vector n;
+    XY n;
     double scale = 1.0;
     double offset = 0.0;
   };
@@ -223,10 +230,9 @@ class Program {
     surprise_.assign(nodes_.periods(), 0.0);
     for (const Foreseen& row : foreseen_) {
       const Place at = spline_.place(row.k, *row.shares);
-      const Vector value = row.is_base
-                               ? Spline::apply(spline_.x().base_accel, spline_.y().base_accel, at)
-                               : Spline::apply(spline_.x().nozzle, spline_.y().nozzle, at);
-      const double now = row.scale * (row.n.x * value.x + row.n.y * value.y) - row.offset;
+      const FlatOutputs<D>& flat = spline_.flat();
+      const XY value = Spline::apply(row.is_base ? flat.base_accel : flat.nozzle, at);
+      const double now = row.scale * dot(row.n, value) - row.offset;
       surprise_[row.k] =
           std::max(surprise_[row.k], std::abs(now - program_.value_at_solution(row.row)));
     }
@@ -257,7 +263,7 @@ class Program {
     program_.add_square(Spline::kPerPoint * at.k, folded(at.k, g), v, 2.0 * weight);
   }
 
-  void watch(const At& at, bool is_base, Vector n, double scale, double offset) {
+  void watch(const At& at, bool is_base, XY n, double scale, double offset) {
     if (!is_plain_) {
       foreseen_.push_back({program_.rows() - 1, at.k, at.shares, is_base, n, scale, offset});
     }
@@ -281,7 +287,7 @@ class Program {
     const std::size_t fixed_times =
         is_plain_ ? periods + D : (section_.starts_even || section_.nozzle ? D : 1);
     for (std::size_t j = 0; j < fixed_times; ++j) {
-      fix(j, 2);
+      fix(j, Spline::kTime);
     }
     if (is_plain_ || !section_.ends_even) {
       return;
@@ -289,7 +295,7 @@ class Program {
     // Time goes evenly over the last period.
     const std::size_t first = Spline::kPerPoint * (periods - 1);
     for (int j = 1; j < D; ++j) {
-      const int before = Spline::kPerPoint * j + 2;
+      const int before = Spline::kPerPoint * j + Spline::kTime;
       const int after = before + Spline::kPerPoint;
       Gradient g = Gradient::Zero();
       g[before] = -1.0;
@@ -304,7 +310,7 @@ class Program {
   static Gradient of_clock(const Shares& shares, int derivative, double scale) {
     Gradient g = Gradient::Zero();
     for (int i = 0; i <= D; ++i) {
-      g[Spline::kPerPoint * i + 2] = scale * shares[derivative][i];
+      g[Spline::kPerPoint * i + Spline::kTime] = scale * shares[derivative][i];
     }
     return g;
   }
@@ -330,18 +336,17 @@ class Program {
   void add_accel(const At& at, bool has_square) {
     const double h = nodes_.period_s();
     const double scale = 1.0 / (rounds_.factors(at.k).accel * rules_.max_accel_mm_s2 * h * h);
-    constexpr Vector kAxes[] = {{1.0, 0.0}, {0.0, 1.0}};
-    constexpr Vector kMotors[] = {{1.0, 1.0}, {1.0, -1.0}};
     Gradient g;
-    for (const Vector n : rules_.shares_motors ? kMotors : kAxes) {
-      const double v = spline_.linearise(at.place, *at.shares, n, spline_.x().base_accel,
-                                         spline_.y().base_accel, scale, g);
+    const auto add = [&](const XY& n) {
+      const double v =
+          spline_.linearise(at.place, *at.shares, n, spline_.flat().base_accel, scale, g);
       if (has_square) {
         add_square(at, g, v, kOfAccel);
       }
       add_row(at, g, v, -1.0);
       watch(at, true, n, scale, 0.0);
-    }
+    };
+    for_each_axis(add, rules_.shares_motors ? kAlongMotors : kAlongAxes);
   }
 
   // The base stays where it may be.
@@ -349,45 +354,42 @@ class Program {
     constexpr double kNear_mm = 1.0;
     constexpr double kScale_mm = 0.02;
     constexpr double kTimesForReach = 3.0;
-    const Vector base = Spline::apply(spline_.x().base, spline_.y().base, at.place);
+    const XY base_mm = spline_.origin() + Spline::apply(spline_.flat().base, at.place);
     Gradient g;
-    const auto add = [&](Vector n, const compensate::BaseLimits& limits, double base_mm) {
-      const double below_mm = base_mm - limits.min_position_mm;
-      const double above_mm = limits.max_position_mm - base_mm;
+    const auto add = [&](const XY& n, const compensate::BaseLimits& limits, double at_mm) {
+      const double below_mm = at_mm - limits.min_position_mm;
+      const double above_mm = limits.max_position_mm - at_mm;
       if (!is_plain_ && std::min(below_mm, above_mm) < kNear_mm) {
-        static_cast<void>(spline_.linearise(at.place, *at.shares, n, spline_.x().base,
-                                            spline_.y().base, 1.0 / kScale_mm, g));
+        static_cast<void>(
+            spline_.linearise(at.place, *at.shares, n, spline_.flat().base, 1.0 / kScale_mm, g));
         program_.add_row(Spline::kPerPoint * at.k, folded(at.k, g), 0.0,
                          (kRoom_mm - below_mm) / kScale_mm, (above_mm - kRoom_mm) / kScale_mm,
                          kTimesForReach * kPrice);
       }
     };
-    add({1.0, 0.0}, rules_.limits_x, spline_.origin().x + base.x);
-    add({0.0, 1.0}, rules_.limits_y, spline_.origin().y + base.y);
+    for_each_axis(add, kAlongAxes, rules_.limits, base_mm);
   }
 
   // n·(p − place) is not above the tolerance, also at the edges of the band; nor below minus the
   // tolerance, if there is a lower bound.
-  void add_strip(const At& at, Vector n, Vector place, double tolerance_mm, bool has_square,
+  void add_strip(const At& at, XY n, XY place, double tolerance_mm, bool has_square,
                  double lower = -1.0) {
-    const Vector origin = spline_.origin();
-    const double offset = n.x * (place.x - origin.x) + n.y * (place.y - origin.y);
-    const auto add = [&](const Values& of_x, const Values& of_y, double allowed_mm, Vector left) {
+    const double offset = dot(n, place - spline_.origin());
+    const auto add = [&](const Axes<Values>& of, double allowed_mm, const XY& left) {
       const double scale = 1.0 / allowed_mm;
       Gradient g;
-      const double v = spline_.linearise(at.place, *at.shares, n, of_x, of_y, scale, g) +
-                       scale * (n.x * left.x + n.y * left.y - offset);
+      const double v = spline_.linearise(at.place, *at.shares, n, of, scale, g) +
+                       scale * (dot(n, left) - offset);
       if (has_square) {
         add_square(at, g, v, is_plain_ ? 1.0 : kOfError);
       }
       add_row(at, g, v, lower);
       return scale;
     };
-    const double scale = add(spline_.x().nozzle, spline_.y().nozzle, tolerance_mm, {});
+    const double scale = add(spline_.flat().nozzle, tolerance_mm, {});
     watch(at, false, n, scale, scale * offset);
     for (std::size_t i = 0; i < edges_.size(); ++i) {
-      add(edges_.nozzle_x(i, spline_), edges_.nozzle_y(i, spline_), at_edge_mm(tolerance_mm),
-          edges_.left(i, at.k, at.x));
+      add(edges_.nozzle(i, spline_), at_edge_mm(tolerance_mm), edges_.left(i, at.k, at.x));
     }
   }
 
@@ -401,8 +403,8 @@ class Program {
   }
 
   void add_contour(const At& at, bool has_square) {
-    const Vector d = direction_of(legs_[at.leg]);
-    add_strip(at, {-d.y, d.x}, start_of(legs_[at.leg]), tolerance_mm(at, at.leg), has_square);
+    const XY d = direction_of(legs_[at.leg]);
+    add_strip(at, turned_left(d), start_of(legs_[at.leg]), tolerance_mm(at, at.leg), has_square);
     add_caps(at);
   }
 
@@ -411,21 +413,19 @@ class Program {
   [[nodiscard]] double beyond(std::size_t vertex) const {
     constexpr double kLeastSine = 0.1;
     constexpr double kTimesSine = 2.0;
-    const Vector a = direction_of(legs_[vertex - 1]);
-    const Vector b = direction_of(legs_[vertex]);
-    const double cosine = a.x * b.x + a.y * b.y;
-    return cosine <= 0.0 ? 1.0 : kTimesSine / std::max(std::abs(a.x * b.y - a.y * b.x), kLeastSine);
+    const XY a = direction_of(legs_[vertex - 1]);
+    const XY b = direction_of(legs_[vertex]);
+    return dot(a, b) <= 0.0 ? 1.0 : kTimesSine / std::max(std::abs(cross(a, b)), kLeastSine);
   }
 
   // The nozzle does not pass the ends of a leg at vertices, where the path turns.
   void add_caps(const At& at) {
     const bool has_start = nodes_.is_near_vertex(at.leg, at.k, at.x);
     const bool has_end = nodes_.is_near_vertex(at.leg + 1, at.k, at.x);
-    const Vector d = direction_of(legs_[at.leg]);
-    const Vector start = start_of(legs_[at.leg]);
+    const XY d = direction_of(legs_[at.leg]);
+    const XY start = start_of(legs_[at.leg]);
     if (has_start) {
-      add_strip(at, {-d.x, -d.y}, start, beyond(at.leg) * tolerance_mm(at, at.leg), false,
-                -kInfinity);
+      add_strip(at, -d, start, beyond(at.leg) * tolerance_mm(at, at.leg), false, -kInfinity);
     }
     if (has_end) {
       add_strip(at, d, start_of(legs_[at.leg + 1]), beyond(at.leg + 1) * tolerance_mm(at, at.leg),
@@ -434,20 +434,19 @@ class Program {
   }
 
   void add_feed(const At& at, double feed_mm_s) {
-    const Vector velocity =
-        Spline::apply(spline_.x().nozzle_speed, spline_.y().nozzle_speed, at.place);
+    const XY velocity = Spline::apply(spline_.flat().nozzle_speed, at.place);
+    const double speed = length(velocity);
     const double feed = rounds_.factors(at.k).feed * nodes_.period_s() * feed_mm_s;
-    if (math::hypot(velocity.x, velocity.y) < kNearFeed * feed) {
+    if (speed < kNearFeed * feed) {
       return;
     }
     // A direction that stays from round to round: around one that does not, the nozzle would swing
     // from round to round to where no facet is near.
-    double direction = math::atan2(velocity.y, velocity.x);
-    const Vector d = direction_of(legs_[at.leg]);
-    const double speed = math::hypot(velocity.x, velocity.y);
-    const double along = velocity.x * d.x + velocity.y * d.y;
+    double direction_rad = angle_rad(velocity);
+    const XY d = direction_of(legs_[at.leg]);
+    const double along = dot(velocity, d);
     if (along > math::cos(kFacet_rad) * speed) {
-      direction = math::atan2(d.y, d.x);
+      direction_rad = angle_rad(d);
     }
     // One facet is enough there.
     const bool is_along = along > math::cos(kAlong_rad) * speed &&
@@ -458,9 +457,9 @@ class Program {
       if (facet != 0.0 && is_along) {
         continue;
       }
-      const Vector n{math::cos(direction + facet), math::sin(direction + facet)};
-      const double v = spline_.linearise(at.place, *at.shares, n, spline_.x().nozzle_speed,
-                                         spline_.y().nozzle_speed, 1.0 / feed, g);
+      const XY n{math::cos(direction_rad + facet), math::sin(direction_rad + facet)};
+      const double v =
+          spline_.linearise(at.place, *at.shares, n, spline_.flat().nozzle_speed, 1.0 / feed, g);
       add_row(at, g, v, -kInfinity);
     }
   }
@@ -471,26 +470,23 @@ class Program {
     const At at{pin.k, pin.x, &shares, spline_.place(pin.k, shares), pin.vertex};
     const Leg& before = legs_[pin.vertex - 1];
     const Leg& after = legs_[pin.vertex];
-    const Vector a = direction_of(before);
-    const Vector b = direction_of(after);
-    const Vector corner = start_of(after);
+    const XY a = direction_of(before);
+    const XY b = direction_of(after);
+    const XY corner = start_of(after);
     const double of_before = tolerance_mm(at, pin.vertex - 1);
     const double of_after = tolerance_mm(at, pin.vertex);
-    add_strip(at, {-a.y, a.x}, corner, of_before, true);
-    add_strip(at, {-b.y, b.x}, corner, of_after, true);
+    add_strip(at, turned_left(a), corner, of_before, true);
+    add_strip(at, turned_left(b), corner, of_after, true);
     // Where the path goes straight on or turns back, both strips are almost one. A third one
     // crosses them, which is wide where a turn is sharp, since the nozzle cuts that short by more.
     // Where all of a leg is gone back, its end counts as any place on it.
     constexpr double kTimesBack = 3.0;
     constexpr double kAllBack = 1e-6;
-    const bool turns_back = a.x * b.x + a.y * b.y < 0.0;
-    const double times =
-        turns_back && math::hypot(a.x + b.x, a.y + b.y) > kAllBack ? kTimesBack : 1.0;
+    const bool turns_back = dot(a, b) < 0.0;
+    const double times = turns_back && length(a + b) > kAllBack ? kTimesBack : 1.0;
     const double side = turns_back ? -1.0 : 1.0;
-    Vector through{a.x + side * b.x, a.y + side * b.y};
-    const double length = math::hypot(through.x, through.y);
-    through = {through.x / length, through.y / length};
-    add_strip(at, through, corner, times * std::min(of_before, of_after), false);
+    const XY through = a + side * b;
+    add_strip(at, through / length(through), corner, times * std::min(of_before, of_after), false);
     add_feed(at, std::min({before.feed_mm_s, after.feed_mm_s, after.entry_mm_s}));
   }
 
@@ -533,8 +529,8 @@ class Program {
     }
     add_accel(at(periods - 1, 1.0, at_end_), true);
     for (int i = 0; i <= D; ++i) {
-      program_.add_linear(Spline::kPerPoint * i + 2, -at_node_[0][i]);
-      program_.add_linear(Spline::kPerPoint * (periods - 1 + i) + 2, at_end_[0][i]);
+      program_.add_linear(Spline::kPerPoint * i + Spline::kTime, -at_node_[0][i]);
+      program_.add_linear(Spline::kPerPoint * (periods - 1 + i) + Spline::kTime, at_end_[0][i]);
     }
     program_.add_damping(kOfStep);
     const std::optional<std::span<const double>> step = program_.solve(gap(), iterations_);
@@ -554,14 +550,12 @@ class Program {
     for (std::size_t k = 0; k < nodes_.periods(); ++k) {
       for (int look = 0; look < kLooks + (k + 1 == nodes_.periods() ? 1 : 0); ++look) {
         const At here = at(k, static_cast<double>(look) / kLooks, kSharesAtLooks<D>[look]);
-        const Vector accel =
-            Spline::apply(spline_.x().base_accel, spline_.y().base_accel, here.place);
-        const double a = rules_.shares_motors ? std::abs(accel.x) + std::abs(accel.y)
-                                              : std::max(std::abs(accel.x), std::abs(accel.y));
-        const Vector speed =
-            Spline::apply(spline_.x().nozzle_speed, spline_.y().nozzle_speed, here.place);
+        const FlatOutputs<D>& flat = spline_.flat();
+        const double a =
+            asked_of_motors(Spline::apply(flat.base_accel, here.place), rules_.shares_motors);
+        const XY velocity = Spline::apply(flat.nozzle_speed, here.place);
         excess[k].include({a / (rules_.max_accel_mm_s2 * h * h), error(here),
-                           math::hypot(speed.x, speed.y) / (h * legs_[here.leg].feed_mm_s)});
+                           length(velocity) / (h * legs_[here.leg].feed_mm_s)});
       }
     }
     const double of_end = excess_at_end(excess);
@@ -570,16 +564,13 @@ class Program {
 
   // e relative to the tolerance, the largest of the axes as given and at the edges of the band.
   [[nodiscard]] double error(const At& at) const {
-    const Vector p = spline_.nozzle_mm(at.place);
+    const XY p = spline_.nozzle_mm(at.place);
     const double tolerance = nodes_.tolerance_mm(at.leg, at.k, at.x, kBesideInTheEnd);
     double e = nodes_.error_mm(at.k, at.x, p) / tolerance;
     for (std::size_t i = 0; i < edges_.size(); ++i) {
-      const Vector of_edge =
-          Spline::apply(edges_.nozzle_x(i, spline_), edges_.nozzle_y(i, spline_), at.place);
-      const Vector left = edges_.left(i, at.k, at.x);
-      const Vector origin = spline_.origin();
-      const double at_edge = nodes_.error_mm(
-          at.k, at.x, {origin.x + of_edge.x + left.x, origin.y + of_edge.y + left.y});
+      const XY of_edge = Spline::apply(edges_.nozzle(i, spline_), at.place);
+      const double at_edge =
+          nodes_.error_mm(at.k, at.x, spline_.origin() + of_edge + edges_.left(i, at.k, at.x));
       e = std::max(e, at_edge / at_edge_mm(tolerance));
     }
     return e;
@@ -597,10 +588,8 @@ class Program {
     }
     if (section_.swing_tolerance_mm) {
       const Place end = spline_.place(nodes_.periods() - 1, at_end_);
-      const Vector origin = spline_.origin();
-      const Vector base = Spline::apply(spline_.x().base, spline_.y().base, end);
-      excess = std::max(excess, edges_.largest_swing_mm({origin.x + base.x, origin.y + base.y}) /
-                                    *section_.swing_tolerance_mm);
+      const XY base_mm = spline_.origin() + Spline::apply(spline_.flat().base, end);
+      excess = std::max(excess, edges_.largest_swing_mm(base_mm) / *section_.swing_tolerance_mm);
     }
     return excess;
   }
@@ -660,11 +649,12 @@ class SplineMotion : public SectionMotion {
     }
     using Spline = SectionSpline<D>;
     const auto at = spline_.place(k, shares);
-    const double h = spline_.period_s();
-    const Vector place = Spline::apply(spline_.x().base, spline_.y().base, at);
-    const Vector speed = Spline::apply(spline_.x().base_speed, spline_.y().base_speed, at);
-    return {{spline_.origin().x + place.x, speed.x / h},
-            {spline_.origin().y + place.y, speed.y / h}};
+    return map_axes(
+        [](double place_mm, double speed_mm_s) {
+          return OfAxis{place_mm, speed_mm_s};
+        },
+        spline_.origin() + Spline::apply(spline_.flat().base, at),
+        Spline::apply(spline_.flat().base_speed, at) / spline_.period_s());
   }
 
   [[nodiscard]] std::vector<dynamics::NozzleXY> edge_nozzles() const override {
@@ -674,7 +664,7 @@ class SplineMotion : public SectionMotion {
   [[nodiscard]] std::vector<Passage> passages() const override {
     std::vector<Passage> result;
     const auto add = [&](std::size_t k, double x) {
-      const Vector p = spline_.nozzle_mm(spline_.place(k, spline_shares<D>(x)));
+      const XY p = spline_.nozzle_mm(spline_.place(k, spline_shares<D>(x)));
       const std::size_t leg = nodes_.nearest_leg(k, x, p);
       result.push_back(
           {(clock(k, x) - times_.front()) * spline_.period_s(), leg, nodes_.along_mm(leg, p)});

@@ -6,25 +6,21 @@
 #include <vector>
 
 #include "sections.hpp"
+#include "unflex/core/axes.hpp"
+#include "unflex/core/xy.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
 
 namespace unflex::timing {
 
 // Axes that the machine may have instead, whose frequencies are a little different.
-struct SectionEdge {
-  dynamics::FlexibleAxis x;
-  dynamics::FlexibleAxis y;
-  double off_x = 0.0;  // ω relative to that of the axis as given, less 1
-  double off_y = 0.0;
+struct SectionEdge : Axes<dynamics::FlexibleAxis> {
+  XY off;  // ω relative to that of the axis as given, less 1
 };
 
 // What the motion is to keep.
-struct SectionRules {
-  dynamics::Mode x;
-  dynamics::Mode y;
+struct SectionRules : Axes<dynamics::Mode> {
   // Where the base may be.
-  compensate::BaseLimits limits_x;
-  compensate::BaseLimits limits_y;
+  Axes<compensate::BaseLimits> limits;
   // Their nozzles may stray so many tolerances, but no more than travel.
   std::vector<SectionEdge> edges;
   double times_tolerance = 2.0;
@@ -52,10 +48,7 @@ class SectionMotion {
     double position_mm = 0.0;
     double velocity_mm_s = 0.0;
   };
-  struct Base {
-    OfAxis x;
-    OfAxis y;
-  };
+  using Base = Axes<OfAxis>;
   [[nodiscard]] virtual Base base(double t) const = 0;
   // The nozzles of SectionRules::edges at the end.
   [[nodiscard]] virtual std::vector<dynamics::NozzleXY> edge_nozzles() const = 0;

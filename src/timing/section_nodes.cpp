@@ -9,9 +9,6 @@
 namespace unflex::timing {
 namespace {
 
-using gcode::X;
-using gcode::Y;
-
 constexpr std::size_t kFewestPeriods = 18;
 // A path that turns by more has a bound vertex.
 constexpr double kTurn_rad = 0.0873;
@@ -23,11 +20,9 @@ double u_of(const SectionNodes::Pin& pin) { return static_cast<double>(pin.k) + 
 
 }  // namespace
 
-Vector start_of(const Leg& leg) {
-  return {leg.move.segment.start_mm[X], leg.move.segment.start_mm[Y]};
-}
+XY start_of(const Leg& leg) { return xy_of(leg.move.segment.start_mm); }
 
-Vector direction_of(const Leg& leg) { return {leg.move.direction[X], leg.move.direction[Y]}; }
+XY direction_of(const Leg& leg) { return xy_of(leg.move.direction); }
 
 SectionNodes::SectionNodes(const Section& section, double node_s) : legs_(section.legs) {
   std::vector<double> begins_s = {0.0};
@@ -44,8 +39,7 @@ SectionNodes::SectionNodes(const Section& section, double node_s) : legs_(sectio
     while (leg + 1 < legs_.size() && t >= begins_s[leg + 1]) {
       ++leg;
     }
-    const gcode::Position at = legs_[leg].move.position_mm(t - begins_s[leg]);
-    places_.push_back({at[X], at[Y]});
+    places_.push_back(xy_of(legs_[leg].move.position_mm(t - begins_s[leg])));
   }
   for (double& begin : begins_s) {
     begin /= period_s_;
@@ -57,9 +51,9 @@ SectionNodes::SectionNodes(const Section& section, double node_s) : legs_(sectio
 void SectionNodes::bind(const std::vector<double>& begins) {
   double turned_rad = 0.0;
   for (std::size_t i = 1; i < legs_.size(); ++i) {
-    const Vector a = direction_of(legs_[i - 1]);
-    const Vector b = direction_of(legs_[i]);
-    turned_rad += std::abs(math::atan2(a.x * b.y - a.y * b.x, a.x * b.x + a.y * b.y));
+    const XY a = direction_of(legs_[i - 1]);
+    const XY b = direction_of(legs_[i]);
+    turned_rad += std::abs(math::atan2(cross(a, b), dot(a, b)));
     const bool is_border = legs_[i - 1].lays_filament != legs_[i].lays_filament ||
                            !have_same_feed(legs_[i - 1], legs_[i]) ||
                            legs_[i - 1].tolerance_mm != legs_[i].tolerance_mm ||
@@ -88,21 +82,16 @@ SectionNodes::Range SectionNodes::legs(std::size_t k, double x) const {
           next < pins_.size() ? pins_[next].vertex - 1 : legs_.size() - 1};
 }
 
-double SectionNodes::along_mm(std::size_t leg, Vector nozzle) const {
-  const Vector s = start_of(legs_[leg]);
-  const Vector d = direction_of(legs_[leg]);
-  return std::clamp((nozzle.x - s.x) * d.x + (nozzle.y - s.y) * d.y, 0.0,
+double SectionNodes::along_mm(std::size_t leg, XY nozzle) const {
+  return std::clamp(dot(nozzle - start_of(legs_[leg]), direction_of(legs_[leg])), 0.0,
                     legs_[leg].move.length_mm);
 }
 
-double SectionNodes::distance_mm(std::size_t leg, Vector nozzle) const {
-  const double along = along_mm(leg, nozzle);
-  const Vector s = start_of(legs_[leg]);
-  const Vector d = direction_of(legs_[leg]);
-  return math::hypot(nozzle.x - s.x - along * d.x, nozzle.y - s.y - along * d.y);
+double SectionNodes::distance_mm(std::size_t leg, XY nozzle) const {
+  return length(nozzle - start_of(legs_[leg]) - along_mm(leg, nozzle) * direction_of(legs_[leg]));
 }
 
-std::size_t SectionNodes::nearest_leg(std::size_t k, double x, Vector nozzle) const {
+std::size_t SectionNodes::nearest_leg(std::size_t k, double x, XY nozzle) const {
   const Range range = legs(k, x);
   std::size_t nearest = range.first;
   double least = std::numeric_limits<double>::infinity();
@@ -116,7 +105,7 @@ std::size_t SectionNodes::nearest_leg(std::size_t k, double x, Vector nozzle) co
   return nearest;
 }
 
-double SectionNodes::error_mm(std::size_t k, double x, Vector nozzle) const {
+double SectionNodes::error_mm(std::size_t k, double x, XY nozzle) const {
   Range range = legs(k, x);
   // Near a bound vertex the nozzle may be nearer to the leg behind it.
   if (range.first > 0 && is_near_vertex(range.first, k, x)) {

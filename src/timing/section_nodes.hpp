@@ -12,16 +12,12 @@
 #include <vector>
 
 #include "sections.hpp"
+#include "unflex/core/xy.hpp"
 
 namespace unflex::timing {
 
-struct Vector {
-  double x = 0.0;
-  double y = 0.0;
-};
-
-[[nodiscard]] Vector start_of(const Leg& leg);
-[[nodiscard]] Vector direction_of(const Leg& leg);
+[[nodiscard]] XY start_of(const Leg& leg);
+[[nodiscard]] XY direction_of(const Leg& leg);
 
 class SectionNodes {
  public:
@@ -32,7 +28,7 @@ class SectionNodes {
   [[nodiscard]] std::size_t periods() const { return periods_; }
   [[nodiscard]] double period_s() const { return period_s_; }
   // Where the first plan is at a node.
-  [[nodiscard]] Vector place(std::size_t node) const { return places_[node]; }
+  [[nodiscard]] XY place(std::size_t node) const { return places_[node]; }
 
   static constexpr double kBeside = 2.5;
 
@@ -45,11 +41,11 @@ class SectionNodes {
   [[nodiscard]] std::span<const Pin> pins() const { return pins_; }
 
   // The leg at u that the nozzle is nearest to.
-  [[nodiscard]] std::size_t nearest_leg(std::size_t k, double x, Vector nozzle) const;
+  [[nodiscard]] std::size_t nearest_leg(std::size_t k, double x, XY nozzle) const;
   // How far along a leg the nozzle is; its ends are the farthest.
-  [[nodiscard]] double along_mm(std::size_t leg, Vector nozzle) const;
+  [[nodiscard]] double along_mm(std::size_t leg, XY nozzle) const;
   // How far the nozzle is from the path around u.
-  [[nodiscard]] double error_mm(std::size_t k, double x, Vector nozzle) const;
+  [[nodiscard]] double error_mm(std::size_t k, double x, XY nozzle) const;
 
   // What the nozzle may do on a leg, at u. Beside filament travel keeps to what filament asks for,
   // since lines do not end exactly where filament does.
@@ -68,13 +64,13 @@ class SectionNodes {
   };
   // The legs between the bound vertices around u.
   [[nodiscard]] Range legs(std::size_t k, double x) const;
-  [[nodiscard]] double distance_mm(std::size_t leg, Vector nozzle) const;
+  [[nodiscard]] double distance_mm(std::size_t leg, XY nozzle) const;
   void bind(const std::vector<double>& begins);
 
   std::span<const Leg> legs_;
   std::size_t periods_ = 0;
   double period_s_ = 0.0;
-  std::vector<Vector> places_;
+  std::vector<XY> places_;
   std::vector<Pin> pins_;
   std::vector<std::size_t> first_pin_;  // that comes after node k
 };

@@ -15,6 +15,8 @@
 #include "section_motion.hpp"
 #include "section_nodes.hpp"
 #include "time_derivatives.hpp"
+#include "unflex/core/axes.hpp"
+#include "unflex/core/xy.hpp"
 #include "uniform_spline.hpp"
 
 namespace unflex::timing {
@@ -24,7 +26,9 @@ class SectionSpline {
  public:
   using Values = Derivatives<D>;
   using Shares = SplineShares<D>;
-  static constexpr int kPerPoint = 3;  // x, y, t of a control point
+  // A control point has a place on each axis, and then t.
+  static constexpr int kTime = XY::kCount;
+  static constexpr int kPerPoint = kTime + 1;
   static constexpr int kWidth = kPerPoint * (D + 1);
   using Gradient = Eigen::Matrix<double, kWidth, 1>;
   // A control point stands for the node so many before it.
@@ -32,22 +36,22 @@ class SectionSpline {
 
   // The first plan of the nodes: even time, and its places smoothed by the spline.
   SectionSpline(const Section& section, const SectionRules& rules, const SectionNodes& nodes)
-      : x_(flat_output<D>(rules.x, nodes.period_s())),
-        y_(flat_output<D>(rules.y, nodes.period_s())),
-        origin_(nodes.place(0)),
-        period_s_(nodes.period_s()),
-        periods_(nodes.periods()) {
+      : origin_(nodes.place(0)), period_s_(nodes.period_s()), periods_(nodes.periods()) {
+    const auto flat = map_axes(
+        [&](const dynamics::Mode& mode) { return flat_output<D>(mode, period_s_); }, rules);
+    flat_ = of_all_axes(flat);
     const auto last = static_cast<long>(periods_);
     for (long node = -kAhead; node < last + D - kAhead; ++node) {
-      const Vector at = nodes.place(static_cast<std::size_t>(std::clamp(node, 0L, last)));
-      points_.insert(points_.end(),
-                     {at.x - origin_.x, at.y - origin_.y, static_cast<double>(node)});
+      const XY at = nodes.place(static_cast<std::size_t>(std::clamp(node, 0L, last))) - origin_;
+      for_each_axis([&](double place) { points_.push_back(place); }, at);
+      points_.push_back(static_cast<double>(node));
     }
     set_end(0, section.legs.front(), 0.0, section.starts_even);
     set_end(periods_, section.legs.back(), section.legs.back().move.length_mm, section.ends_even);
     if (section.nozzle) {
-      set_swing(0, x_, section.nozzle->x, origin_.x);
-      set_swing(1, y_, section.nozzle->y, origin_.y);
+      for (std::size_t axis = 0; axis < XY::kCount; ++axis) {
+        set_swing(axis, flat[axis], (*section.nozzle)[axis]);
+      }
     }
   }
 
@@ -63,9 +67,8 @@ class SectionSpline {
     return matrix;
   }
 
-  [[nodiscard]] const FlatOutput<D>& x() const { return x_; }
-  [[nodiscard]] const FlatOutput<D>& y() const { return y_; }
-  [[nodiscard]] Vector origin() const { return origin_; }
+  [[nodiscard]] const FlatOutputs<D>& flat() const { return flat_; }
+  [[nodiscard]] XY origin() const { return origin_; }
   [[nodiscard]] double period_s() const { return period_s_; }
   [[nodiscard]] std::size_t periods() const { return periods_; }
   [[nodiscard]] std::vector<double>& points() { return points_; }
@@ -75,7 +78,7 @@ class SectionSpline {
   [[nodiscard]] double clock(std::size_t k, const Shares& shares, int derivative = 0) const {
     double sum = 0.0;
     for (int i = 0; i <= D; ++i) {
-      sum += shares[derivative][i] * points_[kPerPoint * (k + i) + 2];
+      sum += shares[derivative][i] * points_[kPerPoint * (k + i) + kTime];
     }
     return sum;
   }
@@ -83,8 +86,7 @@ class SectionSpline {
   // All there is to know at one u.
   struct Place {
     TimeDerivatives<D> by_time;
-    Values x;  // the flat outputs and their derivatives by time
-    Values y;
+    Axes<Values> flat;  // the flat outputs and their derivatives by time
   };
   [[nodiscard]] Place place(std::size_t k, const Shares& shares) const {
     // x, y and t side by side in a register; the fourth is not used.
@@ -92,8 +94,7 @@ class SectionSpline {
     for (std::size_t i = 0; i <= D; ++i) {
       std::copy_n(&points_[kPerPoint * (k + i)], kPerPoint, points[i].data());
     }
-    Values x{};
-    Values y{};
+    Axes<Values> flat{};
     Values t{};
     for (int j = 0; j < D; ++j) {
       std::array<double, 4> sum{};
@@ -102,15 +103,17 @@ class SectionSpline {
           sum[lane] += shares[j][i] * points[i][lane];
         }
       }
-      x[j] = sum[0];
-      y[j] = sum[1];
-      t[j] = sum[2];
+      for (std::size_t axis = 0; axis < XY::kCount; ++axis) {
+        flat[axis][j] = sum[axis];
+      }
+      t[j] = sum[kTime];
     }
     const TimeDerivatives<D> by_time(t);
-    return {by_time, by_time.by_time(x), by_time.by_time(y)};
+    return {by_time,
+            map_axes([&](const Values& by_node) { return by_time.by_time(by_node); }, flat)};
   }
 
-  static double dot(const Values& a, const Values& b) {
+  static double sum_of_products(const Values& a, const Values& b) {
     double sum = 0.0;
     for (int i = 0; i < D; ++i) {
       sum += a[i] * b[i];
@@ -118,26 +121,29 @@ class SectionSpline {
     return sum;
   }
   // What the factors make of the flat outputs.
-  static Vector apply(const Values& of_x, const Values& of_y, const Place& at) {
-    return {dot(of_x, at.x), dot(of_y, at.y)};
+  static XY apply(const Axes<Values>& factors, const Place& at) {
+    return map_axes(sum_of_products, factors, at.flat);
   }
-  [[nodiscard]] Vector nozzle_mm(const Place& at) const {
-    const Vector p = apply(x_.nozzle, y_.nozzle, at);
-    return {origin_.x + p.x, origin_.y + p.y};
-  }
+  [[nodiscard]] XY nozzle_mm(const Place& at) const { return origin_ + apply(flat_.nozzle, at); }
 
-  // scale (n_x times what of_x makes of x, and likewise of y), and its gradient in the control
-  // points from number k on.
-  double linearise(const Place& at, const Shares& shares, Vector n, const Values& of_x,
-                   const Values& of_y, double scale, Gradient& g) const {
-    const Values x = at.by_time.by_function(of_x);
-    const Values y = at.by_time.by_function(of_y);
-    const Values clock_x = at.by_time.by_clock(of_x, at.x);
-    const Values clock_y = at.by_time.by_clock(of_y, at.y);
-    std::array<std::array<double, 4>, D> factors{};  // of x, y and t
+  // scale n·(what the factors make of the flat outputs), and its gradient in the control points
+  // from number k on.
+  double linearise(const Place& at, const Shares& shares, const XY& n, const Axes<Values>& of,
+                   double scale, Gradient& g) const {
+    const Axes<Values> by_function =
+        map_axes([&](const Values& of_axis) { return at.by_time.by_function(of_axis); }, of);
+    const Axes<Values> by_clock =
+        map_axes([&](const Values& of_axis,
+                     const Values& flat) { return at.by_time.by_clock(of_axis, flat); },
+                 of, at.flat);
+    std::array<std::array<double, 4>, D> factors{};  // of the places and of t
     for (int j = 0; j < D; ++j) {
-      factors[j] = {x[j] * (scale * n.x), y[j] * (scale * n.y),
-                    scale * (n.x * clock_x[j] + n.y * clock_y[j]), 0.0};
+      for (std::size_t axis = 0; axis < XY::kCount; ++axis) {
+        factors[j][axis] = by_function[axis][j] * (scale * n[axis]);
+      }
+      factors[j][kTime] =
+          scale * sum_of_axes([&](double share, const Values& clock) { return share * clock[j]; },
+                              n, by_clock);
     }
     for (int i = 0; i <= D; ++i) {
       std::array<double, 4> sum{};
@@ -150,29 +156,30 @@ class SectionSpline {
         g[kPerPoint * i + part] = sum[static_cast<std::size_t>(part)];
       }
     }
-    const Vector value = apply(of_x, of_y, at);
-    return scale * (n.x * value.x + n.y * value.y);
+    return scale * dot(n, apply(of, at));
   }
 
  private:
   // An end at rest, or in even motion, which the flat output follows as far behind as the nozzle is
   // ahead of it.
   void set_end(std::size_t first, const Leg& leg, double along_mm, bool is_even) {
-    const Vector d = direction_of(leg);
-    const Vector start = start_of(leg);
+    const XY d = direction_of(leg);
+    const XY start = start_of(leg);
     const double step_mm = is_even ? leg.feed_mm_s * period_s_ : 0.0;
     for (int j = 0; j < D; ++j) {
       double* const point = &points_[kPerPoint * (first + j)];
       const double ahead = static_cast<double>(j - kAhead);
-      point[0] = start.x - origin_.x + d.x * (along_mm + step_mm * (ahead - x_.nozzle[1]));
-      point[1] = start.y - origin_.y + d.y * (along_mm + step_mm * (ahead - y_.nozzle[1]));
+      for (std::size_t axis = 0; axis < XY::kCount; ++axis) {
+        point[axis] = start[axis] - origin_[axis] +
+                      d[axis] * (along_mm + step_mm * (ahead - flat_.nozzle[axis][1]));
+      }
     }
   }
 
   // One axis begins with a nozzle that swings on a base at rest. What a different frequency would
   // make of it counts from there on.
-  void set_swing(int axis, const FlatOutput<D>& flat, const dynamics::NozzleMotion& nozzle,
-                 double base_mm) {
+  void set_swing(std::size_t axis, const FlatOutput<D>& flat,
+                 const dynamics::NozzleMotion& nozzle) {
     using Square = Eigen::Matrix<double, D, D>;
     using Column = Eigen::Matrix<double, D, 1>;
     const Values known[] = {flat.nozzle,
@@ -189,7 +196,7 @@ class SectionSpline {
       }
     }
     Column values = Column::Zero();
-    values[0] = nozzle.position - base_mm;
+    values[0] = nozzle.position - origin_[axis];
     values[1] = nozzle.velocity * period_s_;
     const Column derivatives = state.fullPivLu().solve(values);
     const Column points = end_matrix().fullPivLu().solve(derivatives);
@@ -198,9 +205,8 @@ class SectionSpline {
     }
   }
 
-  FlatOutput<D> x_;
-  FlatOutput<D> y_;
-  Vector origin_;
+  FlatOutputs<D> flat_;
+  XY origin_;
   double period_s_;
   std::size_t periods_;
   std::vector<double> points_;

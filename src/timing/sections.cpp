@@ -5,13 +5,10 @@
 
 #include "bounded_plan.hpp"
 #include "corner_speed.hpp"
-#include "unflex/core/math.hpp"
+#include "unflex/core/xy.hpp"
 
 namespace unflex::timing {
 namespace {
-
-using gcode::X;
-using gcode::Y;
 
 // How far the vertices of moves may be from a leg that stands for them: in mm, and as a share of
 // the tolerance.
@@ -22,20 +19,17 @@ constexpr double kLeastSpeed_mm_s = 1.0;
 // Even motion that lasts less is not worth a cut.
 constexpr double kShortestPause_s = 5e-3;
 
-double flat_share(const planner::PlannedMove& move) {
-  return math::hypot(move.direction[X], move.direction[Y]);
-}
+double flat_share(const planner::PlannedMove& move) { return length(xy_of(move.direction)); }
 
 // From one place to another, in X and Y alone.
 planner::PlannedMove straight(const gcode::Position& from, const gcode::Position& to) {
   planner::PlannedMove move;
-  move.segment.start_mm[X] = from[X];
-  move.segment.start_mm[Y] = from[Y];
-  move.segment.end_mm[X] = to[X];
-  move.segment.end_mm[Y] = to[Y];
-  move.length_mm = math::hypot(to[X] - from[X], to[Y] - from[Y]);
-  move.direction[X] = (to[X] - from[X]) / move.length_mm;
-  move.direction[Y] = (to[Y] - from[Y]) / move.length_mm;
+  move.length_mm = distance(xy_of(from), xy_of(to));
+  for (const gcode::Axis axis : {gcode::X, gcode::Y}) {
+    move.segment.start_mm[axis] = from[axis];
+    move.segment.end_mm[axis] = to[axis];
+    move.direction[axis] = (to[axis] - from[axis]) / move.length_mm;
+  }
   return move;
 }
 
@@ -60,11 +54,10 @@ bool are_alike(const Leg& a, const Leg& b) {
 }
 
 double distance_mm(const planner::PlannedMove& line, const gcode::Position& place) {
-  const double x = place[X] - line.segment.start_mm[X];
-  const double y = place[Y] - line.segment.start_mm[Y];
-  const double along =
-      std::clamp(x * line.direction[X] + y * line.direction[Y], 0.0, line.length_mm);
-  return math::hypot(x - along * line.direction[X], y - along * line.direction[Y]);
+  const XY from_start = xy_of(place) - xy_of(line.segment.start_mm);
+  const XY direction = xy_of(line.direction);
+  const double along = std::clamp(dot(from_start, direction), 0.0, line.length_mm);
+  return length(from_start - along * direction);
 }
 
 // Neighbours that lie on one line become one leg.
@@ -74,9 +67,7 @@ std::vector<Leg> joined(const std::vector<Leg>& legs) {
     Leg leg = legs[i];
     std::size_t next = i + 1;
     for (; next < legs.size() && next - i < kMostMovesOfLeg && are_alike(leg, legs[next]); ++next) {
-      if (leg.move.direction[X] * legs[next].move.direction[X] +
-              leg.move.direction[Y] * legs[next].move.direction[Y] <=
-          0.0) {
+      if (dot(xy_of(leg.move.direction), xy_of(legs[next].move.direction)) <= 0.0) {
         break;
       }
       const planner::PlannedMove longer =
@@ -106,10 +97,8 @@ void plan(std::vector<Leg>& legs, const compensate::Setup& setup, double accel_s
   std::vector<double> vertex_mm_s = {0.0};
   for (std::size_t i = 0; i < legs.size(); ++i) {
     const planner::PlannedMove& move = path.emplace_back(legs[i].move);
-    const double x = std::abs(move.direction[X]);
-    const double y = std::abs(move.direction[Y]);
-    bounds.push_back({.speed_mm_s = legs[i].feed_mm_s,
-                      .accel_mm_s2 = accel_mm_s2 / (setup.shares_motors ? x + y : std::max(x, y))});
+    const double of_motors = asked_of_motors(xy_of(move.direction), setup.shares_motors);
+    bounds.push_back({.speed_mm_s = legs[i].feed_mm_s, .accel_mm_s2 = accel_mm_s2 / of_motors});
     if (i + 1 < legs.size()) {
       const double speed_mm_s =
           corner_speed_mm_s(move, legs[i + 1].move, accel_mm_s2,
@@ -155,8 +144,7 @@ void cut(const std::vector<Leg>& legs, double settling_s, std::vector<SectionedP
     }
     part.section.legs.push_back(part_of(leg, 0.0, from_s));
     part.section.ends_even = true;
-    part.pause = {to_s - from_s, leg.move.cruise_v_mm_s * leg.move.direction[X],
-                  leg.move.cruise_v_mm_s * leg.move.direction[Y]};
+    part.pause = {to_s - from_s, leg.move.cruise_v_mm_s * xy_of(leg.move.direction)};
     parts.push_back(std::move(part));
     part = {};
     part.section.starts_even = true;

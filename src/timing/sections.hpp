@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "unflex/compensate/run.hpp"
+#include "unflex/core/xy.hpp"
 #include "unflex/planner/planner.hpp"
 #include "unflex/timing/timing.hpp"
 
@@ -50,8 +51,7 @@ struct Section {
 // What comes after a section: even motion or rest, for some time.
 struct Pause {
   double duration_s = 0.0;
-  double x_mm_s = 0.0;
-  double y_mm_s = 0.0;
+  XY velocity_mm_s;
 };
 
 struct SectionedPart {

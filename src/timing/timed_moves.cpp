@@ -5,13 +5,10 @@
 
 #include "pieces.hpp"
 #include "sections.hpp"
-#include "unflex/core/math.hpp"
+#include "unflex/core/xy.hpp"
 
 namespace unflex::timing {
 namespace {
-
-using gcode::X;
-using gcode::Y;
 
 // A piece of a move between two moments, at an even acceleration.
 planner::PlannedMove piece_between(const planner::PlannedMove& move, double from, double to,
@@ -55,7 +52,7 @@ Timed timed_moves(std::span<const planner::PlannedMove> path, std::span<const Mo
       at.time_s += result.moves.back().duration_s();
       continue;
     }
-    const double length_mm = math::hypot(move.segment.delta(X), move.segment.delta(Y));
+    const double length_mm = distance(xy_of(move.segment.start_mm), xy_of(move.segment.end_mm));
     const double end_mm = path_mm + length_mm;
     const bool is_last = i + 1 == path.size();
     const std::size_t first = result.moves.size();

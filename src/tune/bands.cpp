@@ -8,6 +8,7 @@
 #include <iterator>
 #include <limits>
 
+#include "unflex/core/axes.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
 #include "unflex/flow/flow.hpp"
 #include "unflex/run/verify_rules.hpp"
@@ -17,14 +18,13 @@ namespace unflex::tune {
 namespace {
 
 machine::Settings settings_of_band(const machine::Settings& settings,
-                                   const std::array<tune::Trial, 2>& trials, std::size_t band) {
+                                   const Axes<tune::Trial>& trials, std::size_t band) {
   machine::Settings result = settings;
   const auto set = [&](machine::AxisDynamics& axis, const tune::Trial& trial) {
     const std::size_t number = std::min(band, trial.bands);
     axis = {.freq_hz = trial.freq_hz(number), .damping_ratio = trial.damping_ratio(number)};
   };
-  set(result.dynamics_x, trials[0]);
-  set(result.dynamics_y, trials[1]);
+  for_each_axis(set, result.dynamics, trials);
   result.dynamics_error = {.freq = 0.0, .damping = 0.0};
   result.second = {};
   result.solve.along_weight = 1.0;
@@ -159,10 +159,11 @@ class WallWatcher final : public Watcher {
   // Later layers lie upon earlier ones, and only the outer ring counts.
   static void look(const dynamics::NozzleMotionXY& nozzle, const tune::Wall& wall, Relief& relief) {
     constexpr double kNear_mm = 0.15;
-    const double along_mm = (wall.shows_x ? nozzle.y.position : nozzle.x.position) - wall.from_mm;
+    const std::size_t shown = wall.shows_x ? gcode::X : gcode::Y;
+    const double across_mm = nozzle[shown].position;
+    const double along_mm = nozzle[1 - shown].position - wall.from_mm;
     // The right wall's inside is towards −X, the bottom wall's towards +Y.
-    const double inward_mm =
-        wall.shows_x ? wall.at_mm - nozzle.x.position : nozzle.y.position - wall.at_mm;
+    const double inward_mm = wall.shows_x ? wall.at_mm - across_mm : across_mm - wall.at_mm;
     const double place = along_mm / kRelief_mm;
     if (std::abs(inward_mm) < kNear_mm && place >= 0.0 &&
         place < static_cast<double>(relief.inward_um.size())) {

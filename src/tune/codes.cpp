@@ -49,8 +49,7 @@ Result<Codes> codes_of(const std::string& print, const std::string& name, Firmwa
   std::string behind;  // since the last move that lays filament
   bool laid = false;
   bool in_layers = false;
-  Range x_mm;
-  Range y_mm;
+  Axes<Range> laid_mm;
   std::string before_first;  // the start code of a print without marks of layers
   for (gcode::Line line;;) {
     const Result<bool> more = lines.next(line);
@@ -64,8 +63,7 @@ Result<Codes> codes_of(const std::string& print, const std::string& name, Firmwa
     if (!in_layers && gcode::begins_layer(content)) {
       in_layers = true;
       // What was laid before is the start code's.
-      x_mm = {};
-      y_mm = {};
+      laid_mm = {};
       codes.start = before_first + behind;
       behind.clear();
       laid = false;
@@ -75,8 +73,8 @@ Result<Codes> codes_of(const std::string& print, const std::string& name, Firmwa
     const bool extrudes = std::ranges::any_of(event.segments, &gcode::Segment::extruding);
     if (extrudes) {
       for (const gcode::Segment& segment : event.segments) {
-        x_mm.add(segment.end_mm[gcode::X]);
-        y_mm.add(segment.end_mm[gcode::Y]);
+        for_each_axis([](Range& range, double end_mm) { range.add(end_mm); }, laid_mm,
+                      xy_of(segment.end_mm));
       }
       if (!in_layers && !laid) {
         codes.start = behind;
@@ -95,8 +93,7 @@ Result<Codes> codes_of(const std::string& print, const std::string& name, Firmwa
                 "tower is to have");
   }
   codes.end = behind;
-  codes.center_x_mm = x_mm.middle();
-  codes.center_y_mm = y_mm.middle();
+  codes.center_mm = map_axes([](const Range& range) { return range.middle(); }, laid_mm);
   return codes;
 }
 

@@ -55,7 +55,7 @@ Tower tower(const PressureTowerSettings& settings) {
   const PressureWall parts = pressure_wall(settings);
   TowerWriter writer(settings, parts.fast_mm + 2.0 * parts.slow_mm);
   const auto step_wall = [&](int wall, double inset_mm) {
-    const Point start = writer.corner(wall + 2, inset_mm, 1.0);
+    const XY start = writer.corner(wall + 2, inset_mm, 1.0);
     const auto at = [&](double distance_mm) {
       return TowerWriter::on_wall(wall, start, distance_mm, 0.0);
     };

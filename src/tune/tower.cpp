@@ -71,7 +71,7 @@ std::size_t axis_of(int wall) { return wall % 2 == 0 ? 1 : 0; }
 
 void write_wall(TowerWriter& writer, int wall, double inset_mm, const Parts& parts,
                 const Waves& waves, int per_wave) {
-  const Point start = writer.corner(wall + 2, inset_mm, 1.0);
+  const XY start = writer.corner(wall + 2, inset_mm, 1.0);
   const auto to = [&](double distance_mm, double inward_mm) {
     writer.extrude(TowerWriter::on_wall(wall, start, distance_mm, inward_mm), parts.speed_mm_s);
   };
@@ -87,12 +87,12 @@ void write_wall(TowerWriter& writer, int wall, double inset_mm, const Parts& par
 
 // The straight part of a wall of the outer ring: 0 bottom, 1 right.
 Wall straight_part(const TowerWriter& writer, int wall, const Parts& parts, const Waves& waves) {
-  const bool shows_x = axis_of(wall) == 0;
-  const Point start = writer.corner(wall + 2, 0.0, 1.0);
+  const std::size_t shown = axis_of(wall);
+  const XY start = writer.corner(wall + 2, 0.0, 1.0);
   const double from_mm = parts.lead_in_mm + waves.count * parts.wave_mm;
-  const double begin_mm = shows_x ? start.y_mm : start.x_mm;
-  return {shows_x, shows_x ? start.x_mm : start.y_mm, begin_mm + from_mm,
-          begin_mm + from_mm + parts.straight_mm, parts.speed_mm_s};
+  const double begin_mm = start[1 - shown];
+  return {shown == 0, start[shown], begin_mm + from_mm, begin_mm + from_mm + parts.straight_mm,
+          parts.speed_mm_s};
 }
 
 }  // namespace

@@ -34,13 +34,25 @@ constexpr std::size_t kDeepGroove = 5;
 constexpr double kLiftAtEnd_mm = 10.0;
 constexpr double kClear_mm = 2.0;
 
+// " X… Y…", with so many decimals.
+std::string words(const XY& of_axes, int decimals) {
+  std::string text;
+  for_each_axis([&](std::string_view letter,
+                    double value) { text += fmt::format(" {}{:.{}f}", letter, value, decimals); },
+                kAxisLetters, of_axes);
+  return text;
+}
+
+// The direction at this angle from the X axis.
+XY direction(double angle_rad) { return {math::cos(angle_rad), math::sin(angle_rad)}; }
+
 // Sets these limits. Klipper has one for all moves, and Marlin and RepRapFirmware one for each axis
 // besides, which is set only if the tower goes beyond the printer's own.
 std::string accel_commands(Firmware firmware, const AccelLimits& limits, bool with_axes) {
   if (!spec_of(firmware).motion.has_axis_limits) {
     return fmt::format("M204 S{:.0f}", limits.print);
   }
-  return (with_axes ? fmt::format("M201 X{:.0f} Y{:.0f}\n", limits.x, limits.y) : std::string{}) +
+  return (with_axes ? fmt::format("M201{}\n", words(limits, 0)) : std::string{}) +
          fmt::format("M204 P{:.0f} T{:.0f}", limits.print, limits.travel);
 }
 
@@ -50,7 +62,7 @@ constexpr std::string_view kEndMark = "; unflex tune: end=";
 
 std::string codes_comments(const Codes& codes) {
   std::string text =
-      fmt::format("{}{:.3f} {:.3f}\n", kCenterMark, codes.center_x_mm, codes.center_y_mm);
+      fmt::format("{}{:.3f} {:.3f}\n", kCenterMark, codes.center_mm.x, codes.center_mm.y);
   for (const auto& [mark, code] : {std::pair(kStartMark, &codes.start), {kEndMark, &codes.end}}) {
     std::istringstream lines(*code);
     for (std::string line; std::getline(lines, line);) {
@@ -82,8 +94,8 @@ std::string band_ends(std::size_t number) {
 }
 
 std::string Tower::approach(std::size_t number) const {
-  return fmt::format("G1 Z{:.3f} F{:.0f}\nG1 X{:.3f} Y{:.3f} F{:.0f}\n", bottoms_mm[number - 1],
-                     60.0 * kLiftSpeed_mm_s, begin_x_mm, begin_y_mm, 60.0 * kTravelSpeed_mm_s);
+  return fmt::format("G1 Z{:.3f} F{:.0f}\nG1{} F{:.0f}\n", bottoms_mm[number - 1],
+                     60.0 * kLiftSpeed_mm_s, words(begin_mm, 3), 60.0 * kTravelSpeed_mm_s);
 }
 
 TowerWriter::TowerWriter(const TowerPrinter& printer, double wall_mm)
@@ -96,8 +108,8 @@ TowerWriter::TowerWriter(const TowerPrinter& printer, double wall_mm)
 
 std::string TowerWriter::take() { return std::exchange(text_, {}); }
 
-void TowerWriter::travel(Point to) {
-  line(fmt::format("G1 X{:.3f} Y{:.3f} F{:.0f}", to.x_mm, to.y_mm, 60.0 * kTravelSpeed_mm_s));
+void TowerWriter::travel(XY to) {
+  line(fmt::format("G1{} F{:.0f}", words(to, 3), 60.0 * kTravelSpeed_mm_s));
   at_ = to;
 }
 
@@ -126,27 +138,23 @@ void TowerWriter::ring(double inset_mm, double speed_mm_s, const WallOf& wall_of
   arc(2, inset_mm, 0.0, 0.5, std::min(speed_mm_s, kCornerSpeed_mm_s));
 }
 
-Point TowerWriter::corner(int number, double inset_mm, double share) const {
+XY TowerWriter::corner(int number, double inset_mm, double share) const {
   const double half_mm = side_mm_ / 2.0 - kCornerRadius_mm;
   const double radius_mm = kCornerRadius_mm - inset_mm;
   const double from = 0.5 * kPi * number;
   const double middle = from + 0.25 * kPi;
   const double angle = from + 0.5 * kPi * share;
-  return {printer_->codes.center_x_mm + std::numbers::sqrt2 * half_mm * math::cos(middle) +
-              radius_mm * math::cos(angle),
-          printer_->codes.center_y_mm + std::numbers::sqrt2 * half_mm * math::sin(middle) +
-              radius_mm * math::sin(angle)};
+  return printer_->codes.center_mm + std::numbers::sqrt2 * half_mm * direction(middle) +
+         radius_mm * direction(angle);
 }
 
-Point TowerWriter::on_wall(int wall, Point start, double distance_mm, double inward_mm) {
-  const double along = 0.5 * kPi * wall;
-  return {start.x_mm + distance_mm * math::cos(along) - inward_mm * math::sin(along),
-          start.y_mm + distance_mm * math::sin(along) + inward_mm * math::cos(along)};
+XY TowerWriter::on_wall(int wall, XY start, double distance_mm, double inward_mm) {
+  const XY along = direction(0.5 * kPi * wall);
+  return start + distance_mm * along + inward_mm * turned_left(along);
 }
 
-void TowerWriter::extrude(Point to, double speed_mm_s) {
-  const double length_mm = math::hypot(to.x_mm - at_.x_mm, to.y_mm - at_.y_mm);
-  line(fmt::format("G1 X{:.4f} Y{:.4f} E{:.5f} F{:.0f}", to.x_mm, to.y_mm, e_per_mm_ * length_mm,
+void TowerWriter::extrude(XY to, double speed_mm_s) {
+  line(fmt::format("G1{} E{:.5f} F{:.0f}", words(to, 4), e_per_mm_ * distance(at_, to),
                    60.0 * speed_mm_s));
   at_ = to;
 }
@@ -186,8 +194,7 @@ Tower TowerWriter::write(const std::string& mark, const Bands& bands) {
     }
   }
   result.base = take();
-  result.begin_x_mm = begin(0.0).x_mm;
-  result.begin_y_mm = begin(0.0).y_mm;
+  result.begin_mm = begin(0.0);
   for (std::size_t band = 0; band < bands.count; ++band) {
     text_ += bands.head ? bands.head(band + 1) : std::string{};
     result.bottoms_mm.push_back(z_mm - layer());
@@ -232,8 +239,7 @@ Result<Codes> codes_in(
       const auto x_mm = parse_number(center->substr(0, blank));
       const auto y_mm = parse_number(center->substr(std::min(blank + 1, center->size())));
       has_center = x_mm && y_mm;
-      codes.center_x_mm = x_mm.value_or(0.0);
-      codes.center_y_mm = y_mm.value_or(0.0);
+      codes.center_mm = {x_mm.value_or(0.0), y_mm.value_or(0.0)};
     } else if (const auto start = behind(line, kStartMark)) {
       codes.start += fmt::format("{}\n", *start);
     } else if (const auto end = behind(line, kEndMark)) {

@@ -7,16 +7,12 @@
 #include <string>
 #include <string_view>
 
+#include "unflex/core/xy.hpp"
 #include "unflex/tune/tower.hpp"
 
 namespace unflex::tune {
 
 inline constexpr double kCornerSpeed_mm_s = 30.0;
-
-struct Point {
-  double x_mm = 0.0;
-  double y_mm = 0.0;
-};
 
 class TowerWriter {
  public:
@@ -31,14 +27,14 @@ class TowerWriter {
   [[nodiscard]] std::string take();
 
   void line(const std::string& text) { text_ += text + "\n"; }
-  void extrude(Point to, double speed_mm_s);
+  void extrude(XY to, double speed_mm_s);
 
   // A point of a corner, which is a quarter of a circle: 2 bottom left, 3 bottom right, 4 or 0 top
   // right, 5 or 1 top left. share: 0 where the ring comes in, 1 where it leaves.
-  [[nodiscard]] Point corner(int number, double inset_mm, double share) const;
+  [[nodiscard]] XY corner(int number, double inset_mm, double share) const;
   // `distance_mm` along a wall that begins at `start`, and `inward_mm` off its line: 0 the bottom
   // one, 1 the right one, ….
-  [[nodiscard]] static Point on_wall(int wall, Point start, double distance_mm, double inward_mm);
+  [[nodiscard]] static XY on_wall(int wall, XY start, double distance_mm, double inward_mm);
 
   // Extrudes a wall from where the nozzle is, at the end of the corner ahead of it, to the next.
   using WallOf = std::function<void(int wall, double inset_mm)>;
@@ -59,17 +55,17 @@ class TowerWriter {
   [[nodiscard]] Tower write(const std::string& mark, const Bands& bands);
 
  private:
-  void travel(Point to);
+  void travel(XY to);
   void lift(double z_mm);
   void begin_layer(double z_mm);
   // Where the square's ring begins, in the middle of the corner at the bottom left.
-  [[nodiscard]] Point begin(double inset_mm) const { return corner(2, inset_mm, 0.5); }
+  [[nodiscard]] XY begin(double inset_mm) const { return corner(2, inset_mm, 0.5); }
   void arc(int number, double inset_mm, double from, double to, double speed_mm_s);
 
   const TowerPrinter* printer_;
   double e_per_mm_ = 0.0;
   double side_mm_ = 0.0;
-  Point at_;
+  XY at_;
   std::string text_;
 };
 

@@ -23,8 +23,12 @@ Bundle::Bundle(std::vector<NozzleModel> models)
     : models_(std::move(models)), kernel_(&bundle_kernel()) {
   arrays_.places = (models_.size() + kLanes - 1) / kLanes * kLanes;
   for (const NozzleModel& model : models_) {
-    arrays_.modes = std::max({arrays_.modes, model.x.mode_count(), model.y.mode_count()});
-    fastest_rad_s_ = std::max({fastest_rad_s_, model.x.fastest_rad_s(), model.y.fastest_rad_s()});
+    for_each_axis(
+        [&](const dynamics::FlexibleAxis& axis) {
+          arrays_.modes = std::max(arrays_.modes, axis.mode_count());
+          fastest_rad_s_ = std::max(fastest_rad_s_, axis.fastest_rad_s());
+        },
+        model);
   }
   const std::size_t parts = arrays_.parts();
   for (std::vector<double>* of_modes :
@@ -45,7 +49,7 @@ Bundle::Bundle(std::vector<NozzleModel> models)
   arrays_.was.fill(std::vector<double>(arrays_.places));
   for (std::size_t number = 0; number < models_.size(); ++number) {
     for (const std::size_t axis : {0U, 1U}) {
-      const dynamics::FlexibleAxis& of = axis == 0 ? models_[number].x : models_[number].y;
+      const dynamics::FlexibleAxis& of = models_[number][axis];
       for (std::size_t mode = 0; mode < of.mode_count(); ++mode) {
         const dynamics::Mode& each = of.modes()[mode];
         const std::size_t place = arrays_.place(axis, mode) + number;
@@ -75,8 +79,7 @@ NozzleXY Bundle::nozzle(std::size_t number) const {
   for (std::size_t mode = 0; mode < arrays_.modes; ++mode) {
     for (const std::size_t axis : {0U, 1U}) {
       const std::size_t place = arrays_.place(axis, mode) + number;
-      (axis == 0 ? nozzle.x : nozzle.y).parts[mode] = {arrays_.states[place],
-                                                       arrays_.states[arrays_.parts() + place]};
+      nozzle[axis].parts[mode] = {arrays_.states[place], arrays_.states[arrays_.parts() + place]};
     }
   }
   return nozzle;
@@ -86,7 +89,7 @@ void Bundle::set_nozzle(std::size_t number, const NozzleXY& nozzle) {
   for (std::size_t mode = 0; mode < arrays_.modes; ++mode) {
     for (const std::size_t axis : {0U, 1U}) {
       const std::size_t place = arrays_.place(axis, mode) + number;
-      const dynamics::NozzleMotion& part = (axis == 0 ? nozzle.x : nozzle.y).parts[mode];
+      const dynamics::NozzleMotion& part = nozzle[axis].parts[mode];
       arrays_.states[place] = part.position;
       arrays_.states[arrays_.parts() + place] = part.velocity;
     }
@@ -106,50 +109,52 @@ dynamics::NozzleMotionXY Bundle::motion(std::size_t number) const {
   return {along(0), along(1)};
 }
 
-template <class Change>
-void Bundle::change_all(const Change& change) {
+template <class Change, class Value>
+void Bundle::change_all(const Change& change, const Axes<Value>& by) {
   for (std::size_t number = 0; number < models_.size(); ++number) {
     NozzleXY state = nozzle(number);
-    change(models_[number], state);
+    for_each_axis(change, models_[number], by, state);
     set_nozzle(number, state);
   }
 }
 
-void Bundle::shift(double x_mm, double y_mm) {
-  change_all([&](const NozzleModel& model, NozzleXY& nozzle) {
-    nozzle.x.add(model.x.riding(x_mm));
-    nozzle.y.add(model.y.riding(y_mm));
-  });
+void Bundle::shift(const XY& by_mm) {
+  change_all([&](const dynamics::FlexibleAxis& axis, double by,
+                 dynamics::NozzleState& nozzle) { nozzle.add(axis.riding(by)); },
+             by_mm);
 }
 
-void Bundle::settle(const dynamics::BaseSegment& x, const dynamics::BaseSegment& y,
-                    double duration_s) {
-  change_all([&](const NozzleModel& model, NozzleXY& nozzle) {
-    nozzle.x = dynamics::exact_step(model.x, nozzle.x, x, duration_s);
-    nozzle.y = dynamics::exact_step(model.y, nozzle.y, y, duration_s);
-  });
+void Bundle::settle(const dynamics::BaseXY& base, double duration_s) {
+  change_all(
+      [&](const dynamics::FlexibleAxis& axis, const dynamics::BaseSegment& of_axis,
+          dynamics::NozzleState& nozzle) {
+        nozzle = dynamics::exact_step(axis, nozzle, of_axis, duration_s);
+      },
+      base);
 }
 
-bool Bundle::rest_on(const dynamics::BaseSegment& x, const dynamics::BaseSegment& y) const {
+bool Bundle::rest_on(const dynamics::BaseXY& base) const {
   const auto rests = [](const dynamics::FlexibleAxis& axis, const dynamics::NozzleState& nozzle,
-                        const dynamics::BaseSegment& base) {
+                        const dynamics::BaseSegment& of_axis) {
     const dynamics::FlexibleAxis::Gap gap =
-        axis.gap(nozzle, axis.riding(base.position, base.velocity));
+        axis.gap(nozzle, axis.riding(of_axis.position, of_axis.velocity));
     return std::max(gap.place_mm, gap.speed_mm) < kRests_mm;
   };
   for (std::size_t number = 0; number < models_.size(); ++number) {
-    const NozzleXY state = nozzle(number);
-    if (!rests(models_[number].x, state.x, x) || !rests(models_[number].y, state.y, y)) {
+    if (!all_axes(rests, models_[number], nozzle(number), base)) {
       return false;
     }
   }
   return true;
 }
 
-void Bundle::ride_on(const dynamics::BaseSegment& x, const dynamics::BaseSegment& y) {
-  change_all([&](const NozzleModel& model, NozzleXY& nozzle) {
-    nozzle = {model.x.riding(x.position, x.velocity), model.y.riding(y.position, y.velocity)};
-  });
+void Bundle::ride_on(const dynamics::BaseXY& base) {
+  change_all(
+      [](const dynamics::FlexibleAxis& axis, const dynamics::BaseSegment& of_axis,
+         dynamics::NozzleState& nozzle) {
+        nozzle = axis.riding(of_axis.position, of_axis.velocity);
+      },
+      base);
 }
 
 void Bundle::begin_steps(double steps, double h) {
@@ -165,11 +170,11 @@ void Bundle::begin_steps(double steps, double h) {
   }
 }
 
-void Bundle::step(const dynamics::BaseSegment& x, const dynamics::BaseSegment& y) {
+void Bundle::step(const dynamics::BaseXY& base) {
   if (has_maps_) {
-    kernel_->step_by_maps(x, y, arrays_);
+    kernel_->step_by_maps(base, arrays_);
   } else {
-    kernel_->step(x, y, h_, rk4_steps_, arrays_);
+    kernel_->step(base, h_, rk4_steps_, arrays_);
   }
 }
 

@@ -42,17 +42,17 @@ class Bundle {
   void set_states(const std::vector<double>& states) { arrays_.states = states; }
 
   // Base and nozzles are moved by as much.
-  void shift(double x_mm, double y_mm);
+  void shift(const XY& by_mm);
   // The base goes on, or stands still, for so long.
-  void settle(const dynamics::BaseSegment& x, const dynamics::BaseSegment& y, double duration_s);
+  void settle(const dynamics::BaseXY& base, double duration_s);
   // Whether all nozzles go along with a base in even motion.
-  [[nodiscard]] bool rest_on(const dynamics::BaseSegment& x, const dynamics::BaseSegment& y) const;
-  void ride_on(const dynamics::BaseSegment& x, const dynamics::BaseSegment& y);
+  [[nodiscard]] bool rest_on(const dynamics::BaseXY& base) const;
+  void ride_on(const dynamics::BaseXY& base);
 
   // So many steps of h seconds will follow.
   void begin_steps(double steps, double h);
-  // x, y: the base at the start of the step.
-  void step(const dynamics::BaseSegment& x, const dynamics::BaseSegment& y);
+  // base: at the start of the step.
+  void step(const dynamics::BaseXY& base);
 
   // Measures c of all nozzles at the time of the last slide() of `near`, and between this look and
   // the one before, h seconds ago. h is 0 if the two have nothing to do with each other.
@@ -78,8 +78,9 @@ class Bundle {
   }
 
  private:
-  template <class Change>
-  void change_all(const Change& change);
+  // change(axis, value, nozzle) for each axis of each nozzle.
+  template <class Change, class Value>
+  void change_all(const Change& change, const Axes<Value>& by);
   void add(const std::vector<double>& largest_mm2, double h, BundleSums& sums) const;
   [[nodiscard]] DeviationStats stats(const BundleSums& sums, std::size_t number) const;
 

@@ -53,11 +53,10 @@ class BundleKernel {
   // What a step of h seconds does, by so many RK4 steps.
   virtual void set_maps(double h, int rk4_steps, BundleArrays& at) const = 0;
   // A step that the maps know.
-  virtual void step_by_maps(const dynamics::BaseSegment& x, const dynamics::BaseSegment& y,
-                            BundleArrays& at) const = 0;
+  virtual void step_by_maps(const dynamics::BaseXY& base, BundleArrays& at) const = 0;
   // A step of h seconds, by so many RK4 steps.
-  virtual void step(const dynamics::BaseSegment& x, const dynamics::BaseSegment& y, double h,
-                    int rk4_steps, BundleArrays& at) const = 0;
+  virtual void step(const dynamics::BaseXY& base, double h, int rk4_steps,
+                    BundleArrays& at) const = 0;
   // c² of the nozzles where they are, and what it has been since the look before, h seconds ago, if
   // h is not 0. before_h: likewise how long before that another look was.
   virtual void look(const ReferencePath& path, NearPath& near, double before_h, double h,

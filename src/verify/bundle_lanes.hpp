@@ -30,11 +30,10 @@ class LaneBundle final : public BundleKernel {
   }
 
   // The base's position is carried along so that numbers stay small.
-  void step_by_maps(const dynamics::BaseSegment& x, const dynamics::BaseSegment& y,
-                    BundleArrays& at) const override {
+  void step_by_maps(const dynamics::BaseXY& xy, BundleArrays& at) const override {
     const std::size_t parts = at.parts();
     for (std::size_t place = 0; place < parts; place += kLanes) {
-      const dynamics::BaseSegment& base = 2 * place < parts ? x : y;
+      const dynamics::BaseSegment& base = 2 * place < parts ? xy.x : xy.y;
       double* const position = at.states.data() + place;
       double* const velocity = position + parts;
       const Lanes by_base = base.position * load<Lanes>(at.gain.data() + place);
@@ -51,14 +50,13 @@ class LaneBundle final : public BundleKernel {
     }
   }
 
-  void step(const dynamics::BaseSegment& x, const dynamics::BaseSegment& y, double h, int rk4_steps,
-            BundleArrays& at) const override {
+  void step(const dynamics::BaseXY& xy, double h, int rk4_steps, BundleArrays& at) const override {
     const std::size_t parts = at.parts();
     for (std::size_t place = 0; place < parts; place += kLanes) {
       double* const position = at.states.data() + place;
       double* const velocity = position + parts;
       Motion motion{load<Lanes>(position), load<Lanes>(velocity)};
-      moved(mode_at(place, at), 2 * place < parts ? x : y, h, rk4_steps, motion);
+      moved(mode_at(place, at), 2 * place < parts ? xy.x : xy.y, h, rk4_steps, motion);
       store(motion.position, position);
       store(motion.velocity, velocity);
     }
@@ -142,9 +140,9 @@ class LaneBundle final : public BundleKernel {
     Lanes number = broadcast<Lanes>(0.0);
     for (std::size_t i = 0; i < count; ++i) {
       const NearPath::Span& span = spans[i];
-      const Lanes x = px - broadcast<Lanes>(span.x_mm);
-      const Lanes y = py - broadcast<Lanes>(span.y_mm);
-      Lanes along = span.direction_x * x + span.direction_y * y;
+      const Lanes x = px - broadcast<Lanes>(span.start_mm.x);
+      const Lanes y = py - broadcast<Lanes>(span.start_mm.y);
+      Lanes along = span.direction.x * x + span.direction.y * y;
       along = smaller(larger(along, broadcast<Lanes>(0.0)), broadcast<Lanes>(span.length_mm));
       if (begins_cut && i == 0 && least(along) < near.begin_bound_mm(path)) {
         along = larger(along, broadcast<Lanes>(near.begin_mm(path)));
@@ -152,8 +150,8 @@ class LaneBundle final : public BundleKernel {
       if (ends_cut && i + 1 == count && most(along) > near.end_bound_mm(path)) {
         along = smaller(along, broadcast<Lanes>(near.end_mm(path)));
       }
-      const Lanes across_x = x - span.direction_x * along;
-      const Lanes across_y = y - span.direction_y * along;
+      const Lanes across_x = x - span.direction.x * along;
+      const Lanes across_y = y - span.direction.y * along;
       const Lanes distance2 = across_x * across_x + across_y * across_y;
       const auto is_nearer = less(distance2, best);
       best = select(is_nearer, distance2, best);
@@ -171,13 +169,14 @@ class LaneBundle final : public BundleKernel {
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       s[lane] = near.spans() + static_cast<std::size_t>(number[lane]);
     }
-    const auto of = [&](double NearPath::Span::*value) {
-      return gathered<Lanes>(s[0]->*value, s[1]->*value, s[2]->*value, s[3]->*value);
+    const auto of = [&](XY NearPath::Span::*value, double XY::*axis) {
+      return gathered<Lanes>(s[0]->*value.*axis, s[1]->*value.*axis, s[2]->*value.*axis,
+                             s[3]->*value.*axis);
     };
-    const Lanes direction_x = of(&NearPath::Span::direction_x);
-    const Lanes direction_y = of(&NearPath::Span::direction_y);
-    const Lanes x = px - of(&NearPath::Span::x_mm);
-    const Lanes y = py - of(&NearPath::Span::y_mm);
+    const Lanes direction_x = of(&NearPath::Span::direction, &XY::x);
+    const Lanes direction_y = of(&NearPath::Span::direction, &XY::y);
+    const Lanes x = px - of(&NearPath::Span::start_mm, &XY::x);
+    const Lanes y = py - of(&NearPath::Span::start_mm, &XY::y);
     const Lanes along = direction_x * x + direction_y * y;
     const Lanes speed = direction_x * vx + direction_y * vy;
     const Lanes across_x = x - direction_x * along;

@@ -41,13 +41,12 @@ void CornerGauge::follow(const planner::PlannedMove& move, double start_s, doubl
   if (!(length_mm > 0.0)) {
     return;
   }
-  const double x = segment.delta(gcode::X) / length_mm;
-  const double y = segment.delta(gcode::Y) / length_mm;
+  const XY start_mm = xy_of(segment.start_mm);
+  const XY direction = (xy_of(segment.end_mm) - start_mm) / length_mm;
   if (open_) {
-    const bool goes_on = segment.extruding() && segment.start_mm[gcode::X] == end_mm_[gcode::X] &&
-                         segment.start_mm[gcode::Y] == end_mm_[gcode::Y] &&
+    const bool goes_on = segment.extruding() && start_mm == xy_of(end_mm_) &&
                          segment.start_mm[gcode::Z] == end_mm_[gcode::Z];
-    if (goes_on && x * direction_x_ + y * direction_y_ < kCosineOfSharpest) {
+    if (goes_on && dot(direction, direction_) < kCosineOfSharpest) {
       corners_.back().until_s = start_s + reach_s_;
     } else {
       corners_.pop_back();
@@ -56,37 +55,29 @@ void CornerGauge::follow(const planner::PlannedMove& move, double start_s, doubl
   open_ = segment.extruding();
   if (open_) {
     end_mm_ = segment.end_mm;
-    direction_x_ = x;
-    direction_y_ = y;
-    corners_.push_back({end_s - reach_s_, kNever, end_mm_[gcode::X], end_mm_[gcode::Y], kNever,
-                        segment.line, false});
+    direction_ = direction;
+    corners_.push_back({end_s - reach_s_, kNever, xy_of(end_mm_), kNever, segment.line, false});
   }
   find_next();
 }
 
-void CornerGauge::look(double time_s, double x_mm, double y_mm) {
+void CornerGauge::look(double time_s, const XY& place_mm) {
   while (!corners_.empty() && corners_.front().until_s < time_s) {
     let_go();
   }
-  const double way_x = drawn_ ? last_x_mm_ - x_mm : 0.0;
-  const double way_y = drawn_ ? last_y_mm_ - y_mm : 0.0;
-  const double way2 = way_x * way_x + way_y * way_y;
+  const XY way_mm = drawn_ ? last_mm_ - place_mm : XY{};
+  const double way2 = squared(way_mm);
   const double inverse_way2 = way2 > 0.0 ? 1.0 / way2 : 0.0;
   for (Corner& corner : corners_) {
     if (time_s < corner.from_s) {
       break;
     }
-    const double x = corner.x_mm - x_mm;
-    const double y = corner.y_mm - y_mm;
-    const double share = std::clamp((x * way_x + y * way_y) * inverse_way2, 0.0, 1.0);
-    const double across_x = x - share * way_x;
-    const double across_y = y - share * way_y;
-    corner.distance2_mm2 =
-        std::min(corner.distance2_mm2, across_x * across_x + across_y * across_y);
+    const XY off_mm = corner.place_mm - place_mm;
+    const double share = std::clamp(dot(off_mm, way_mm) * inverse_way2, 0.0, 1.0);
+    corner.distance2_mm2 = std::min(corner.distance2_mm2, squared(off_mm - share * way_mm));
   }
   drawn_ = true;
-  last_x_mm_ = x_mm;
-  last_y_mm_ = y_mm;
+  last_mm_ = place_mm;
 }
 
 void CornerGauge::miss(double time_s) {

@@ -5,8 +5,7 @@ std::vector<NozzleModel> detuned(const NozzleModel& model) {
   std::vector<NozzleModel> result;
   for (const double error : kFrequencyErrors) {
     NozzleModel other = model;
-    other.x = model.x.detuned(1.0 + error);
-    other.y = model.y.detuned(1.0 + error);
+    for_each_axis([&](dynamics::FlexibleAxis& axis) { axis = axis.detuned(1.0 + error); }, other);
     result.push_back(other);
   }
   return result;

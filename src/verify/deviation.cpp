@@ -28,20 +28,28 @@ DeviationStats DeviationAccumulator::stats() const {
 
 NozzleModel coarse(NozzleModel model) {
   constexpr double kSamplesPerPeriod = 20.0;
-  const double fastest_rad_s = std::max(model.x.fastest_rad_s(), model.y.fastest_rad_s());
+  const double fastest_rad_s =
+      most_of_axes([](const dynamics::FlexibleAxis& axis) { return axis.fastest_rad_s(); }, model);
   model.step_s =
       std::max(model.step_s, 2.0 * std::numbers::pi / (kSamplesPerPeriod * fastest_rad_s));
   return model;
 }
 
 double apart_mm(const NozzleXY& a, const NozzleXY& b, const NozzleModel& model) {
-  const dynamics::FlexibleAxis::Gap x = model.x.gap(a.x, b.x);
-  const dynamics::FlexibleAxis::Gap y = model.y.gap(a.y, b.y);
-  return math::hypot(x.place_mm, x.speed_mm, math::hypot(y.place_mm, y.speed_mm));
+  return length(map_axes(
+      [](const dynamics::FlexibleAxis& axis, const dynamics::NozzleState& of_a,
+         const dynamics::NozzleState& of_b) {
+        const dynamics::FlexibleAxis::Gap gap = axis.gap(of_a, of_b);
+        return math::hypot(gap.place_mm, gap.speed_mm);
+      },
+      model, a, b));
 }
 
 double swing_mm(const NozzleXY& nozzle, const gcode::Position& at, const NozzleModel& model) {
-  return apart_mm(nozzle, {model.x.riding(at[gcode::X]), model.y.riding(at[gcode::Y])}, model);
+  const NozzleXY resting =
+      map_axes([](const dynamics::FlexibleAxis& axis, double at_mm) { return axis.riding(at_mm); },
+               model, xy_of(at));
+  return apart_mm(nozzle, resting, model);
 }
 
 RunError run_error(double contour2_mm2_s, double contour_max_mm, double duration_s, double swing_mm,
@@ -53,7 +61,8 @@ RunError run_error(double contour2_mm2_s, double contour_max_mm, double duration
   static constexpr double kLeastDamping = 0.01;
   const double left_mm2_s =
       swing_mm * swing_mm *
-      std::max(model.x.ringing_s(kLeastDamping), model.y.ringing_s(kLeastDamping));
+      most_of_axes([](const dynamics::FlexibleAxis& axis) { return axis.ringing_s(kLeastDamping); },
+                   model);
   return {std::sqrt((contour2_mm2_s + left_mm2_s) / duration_s),
           std::max(contour_max_mm, swing_mm)};
 }
@@ -73,10 +82,10 @@ RunDeviation measure(const std::vector<planner::PlannedMove>& reference,
   Meter meter(model);
   meter.begin_section(path);
   if (base.empty() && reference.empty()) {
-    meter.set_state(start, start.x.position(), start.y.position());
+    meter.set_state(start, dynamics::place_mm(start));
   } else {
     const planner::PlannedMove& first = base.empty() ? reference.front() : base.front();
-    meter.set_state(start, first.segment.start_mm[gcode::X], first.segment.start_mm[gcode::Y]);
+    meter.set_state(start, xy_of(first.segment.start_mm));
   }
   meter.look();
   for (const planner::PlannedMove& move : base) {
@@ -91,8 +100,7 @@ RunDeviation measure(const std::vector<planner::PlannedMove>& reference,
   result.extruding = meter.extruding();
   result.all = meter.all();
   result.end = meter.nozzle();
-  result.base_end_x_mm = meter.base_x_mm();
-  result.base_end_y_mm = meter.base_y_mm();
+  result.base_end_mm = meter.base_mm();
   return result;
 }
 

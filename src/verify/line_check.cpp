@@ -6,7 +6,6 @@
 #include <cmath>
 #include <string_view>
 
-#include "unflex/core/math.hpp"
 #include "unflex/gcode/time_note.hpp"
 
 namespace unflex::verify {
@@ -96,7 +95,7 @@ void LineCheck::compare(const PlacedLine& input, const PlacedLine& output) {
 
 bool LineCheck::at_same_place(const PlacedLine& input, const PlacedLine& output) const {
   const double tolerance = output_->section().compensated ? place_tolerance_mm_ : kRestTolerance_mm;
-  return math::hypot(input.x_mm - output.x_mm, input.y_mm - output.y_mm) <= tolerance;
+  return distance(output.place_mm, input.place_mm) <= tolerance;
 }
 
 void LineCheck::pass(const Section& input, const Section& output) {
@@ -119,8 +118,7 @@ void LineCheck::match(const PlacedLine& input, const PlacedLine& output) {
     violations_->in_output(
         output.line.number,
         fmt::format("'{}' moved along the path by {:.3f} mm (line {} of the sliced file)",
-                    output.line.content(),
-                    math::hypot(input.x_mm - output.x_mm, input.y_mm - output.y_mm),
+                    output.line.content(), distance(output.place_mm, input.place_mm),
                     input.line.number));
   }
 }

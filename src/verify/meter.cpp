@@ -23,13 +23,18 @@ constexpr double kLook_s = 1.0;
 constexpr double kSparser = 6.0;
 
 bool is_cruise(const BasePhase& phase) {
-  return phase.x.acceleration == 0.0 && phase.y.acceleration == 0.0;
+  return all_axes([](const dynamics::BaseSegment& base) { return base.acceleration == 0.0; },
+                  phase.xy);
 }
 
 // The state of the base h seconds later.
 void advance(dynamics::BaseSegment& base, double h) {
   base.position += h * (base.velocity + 0.5 * base.acceleration * h);
   base.velocity += base.acceleration * h;
+}
+
+void advance(dynamics::BaseXY& base, double h) {
+  for_each_axis([h](dynamics::BaseSegment& of_axis) { advance(of_axis, h); }, base);
 }
 
 std::vector<NozzleModel> with(const NozzleModel& model, const std::vector<NozzleModel>& others) {
@@ -78,11 +83,10 @@ void Meter::follow_line(const LineModel& model) {
   line_->watch(observer_, {base_, 0});
 }
 
-void Meter::set_state(const NozzleXY& nozzle, double base_x_mm, double base_y_mm) {
+void Meter::set_state(const NozzleXY& nozzle, const XY& base_mm) {
   bundle_.set_nozzle(0, nozzle);
   last_look_.reset();
-  base_x_mm_ = base_x_mm;
-  base_y_mm_ = base_y_mm;
+  base_mm_ = base_mm;
 }
 
 void Meter::begin_section(ReferencePath& path, double unplayed_s, double unplayed_mm) {
@@ -116,7 +120,7 @@ double Meter::base_offset_mm() {
   // end.
   near_.slide(*path_, std::clamp(time_s_, (*path_)[path_->first()].start_s, path_->end_s()));
   std::size_t nearest = 0;
-  return std::sqrt(near_.squared_contour_error(*path_, base_x_mm_, base_y_mm_, nearest));
+  return std::sqrt(near_.squared_contour_error(*path_, base_mm_, nearest));
 }
 
 double Meter::to_path_end_mm(const gcode::Position& from) const {
@@ -124,7 +128,7 @@ double Meter::to_path_end_mm(const gcode::Position& from) const {
     return 0.0;
   }
   const gcode::Position& end = (*path_)[path_->end() - 1].move.segment.end_mm;
-  return math::hypot(from[gcode::X] - end[gcode::X], from[gcode::Y] - end[gcode::Y]);
+  return distance(xy_of(end), xy_of(from));
 }
 
 double Meter::swing_mm() const {
@@ -140,21 +144,20 @@ void Meter::follow_lag(bool on) {
   follow_lag_ = on;
 }
 
-void Meter::shift_to(double x_mm, double y_mm) {
-  if (x_mm == base_x_mm_ && y_mm == base_y_mm_) {
+void Meter::shift_to(const XY& place_mm) {
+  if (place_mm == base_mm_) {
     return;
   }
   if (corners_) {
     corners_->lift();
   }
-  bundle_.shift(x_mm - base_x_mm_, y_mm - base_y_mm_);
+  bundle_.shift(place_mm - base_mm_);
   last_look_.reset();
-  base_x_mm_ = x_mm;
-  base_y_mm_ = y_mm;
+  base_mm_ = place_mm;
 }
 
 void Meter::play(const planner::PlannedMove& move, const planner::PlannedMove& pushed) {
-  shift_to(move.segment.start_mm[gcode::X], move.segment.start_mm[gcode::Y]);
+  shift_to(xy_of(move.segment.start_mm));
   phases_.clear();
   append_phases(move, pushed.segment.delta(gcode::E), phases_);
   const double start_s = time_s_;
@@ -165,12 +168,11 @@ void Meter::play(const planner::PlannedMove& move, const planner::PlannedMove& p
     time_s_ = start_s + elapsed_s;
   }
   laid_mm_ += move.segment.extruding() ? move.segment.delta(gcode::E) : 0.0;
-  base_x_mm_ = move.segment.end_mm[gcode::X];
-  base_y_mm_ = move.segment.end_mm[gcode::Y];
+  base_mm_ = xy_of(move.segment.end_mm);
 }
 
 void Meter::settle(const BasePhase& phase) {
-  bundle_.settle(phase.x, phase.y, phase.duration_s);
+  bundle_.settle(phase.xy, phase.duration_s);
   last_look_.reset();
   if (corners_) {
     corners_->lift();
@@ -178,11 +180,9 @@ void Meter::settle(const BasePhase& phase) {
   if (line_) {
     line_->rest(phase.duration_s);
   }
-  BasePhase end = phase;
-  advance(end.x, phase.duration_s);
-  advance(end.y, phase.duration_s);
-  base_x_mm_ = end.x.position;
-  base_y_mm_ = end.y.position;
+  dynamics::BaseXY end = phase.xy;
+  advance(end, phase.duration_s);
+  base_mm_ = dynamics::place_mm(end);
 }
 
 // Splits a phase of the base where the reference changes its acceleration or its move.
@@ -199,8 +199,7 @@ void Meter::play(BasePhase phase) {
     integrate(phase, until_s - time_s_, measured);
     time_s_ = until_s;
   }
-  base_x_mm_ = phase.x.position;
-  base_y_mm_ = phase.y.position;
+  base_mm_ = dynamics::place_mm(phase.xy);
 }
 
 // The first time after now at which the reference begins another phase or move; infinity once its
@@ -242,7 +241,7 @@ void Meter::take_corners() {
 }
 
 void Meter::integrate(BasePhase& phase, double duration_s, bool measured) {
-  const bool rides = is_cruise(phase) && bundle_.rest_on(phase.x, phase.y);
+  const bool rides = is_cruise(phase) && bundle_.rest_on(phase.xy);
   const double longest_s = (rides ? kSparser : 1.0) * bundle_.step_s();
   const double steps = std::max(1.0, std::ceil(duration_s / longest_s - 1e-9));
   const double h = duration_s / steps;
@@ -268,12 +267,11 @@ void Meter::integrate(BasePhase& phase, double duration_s, bool measured) {
   last_measured_ = measured;
   for (double number = 1.0; number <= steps; number += 1.0) {
     const dynamics::NozzleMotionXY from = nozzle;
-    bundle_.step(phase.x, phase.y);
-    advance(phase.x, h);
-    advance(phase.y, h);
+    bundle_.step(phase.xy);
+    advance(phase.xy, h);
     advance(phase.e, h);
     if (rides) {
-      bundle_.ride_on(phase.x, phase.y);
+      bundle_.ride_on(phase.xy);
     }
     nozzle = bundle_.motion(0);
     const dynamics::BaseSegment pushed_from = phase.pushed;
@@ -284,8 +282,7 @@ void Meter::integrate(BasePhase& phase, double duration_s, bool measured) {
     }
     Sample sample;
     if (looks) {
-      advance(reference.x, h);
-      advance(reference.y, h);
+      advance(reference.xy, h);
       sample = look_after(h);
       bundle_.count(measured, phase.extruding);
       count(*last_look_, sample, reference, nozzle, measured, phase.extruding, h);
@@ -319,9 +316,9 @@ void Meter::pass_corners(const dynamics::NozzleMotionXY& from, const dynamics::N
     const auto middle = [&](const dynamics::NozzleMotion& a, const dynamics::NozzleMotion& b) {
       return 0.5 * (a.position + b.position) + 0.125 * h * (a.velocity - b.velocity);
     };
-    corners_->sample(now_s - 0.5 * h, middle(from.x, to.x), middle(from.y, to.y));
+    corners_->sample(now_s - 0.5 * h, map_axes(middle, from, to));
   }
-  corners_->sample(now_s, to.x.position, to.y.position);
+  corners_->sample(now_s, dynamics::place_mm(to));
 }
 
 // The reference's motion for the next duration_s. In that time it must change neither its
@@ -358,17 +355,15 @@ Meter::ReferencePhase Meter::reference_phase(double duration_s) const {
     return dynamics::BaseSegment{start_mm + direction * covered, direction * speed,
                                  direction * acceleration * share_xy};
   };
-  return {along(piece.x_mm, piece.direction_x), along(piece.y_mm, piece.direction_y),
-          piece.extruding};
+  return {map_axes(along, piece.start_mm, piece.direction), piece.extruding};
 }
 
 Meter::Sample Meter::look(const ReferencePhase& reference, const dynamics::NozzleMotionXY& nozzle,
                           double since_s) {
   near_.slide(*path_, time_s_);
   bundle_.look(*path_, near_, since_s);
-  const double error_x = reference.x.position - nozzle.x.position;
-  const double error_y = reference.y.position - nozzle.y.position;
-  return {error_x * error_x + error_y * error_y, (*path_)[bundle_.nearest()].move.segment.line};
+  const XY error_mm = dynamics::place_mm(reference.xy) - dynamics::place_mm(nozzle);
+  return {squared(error_mm), (*path_)[bundle_.nearest()].move.segment.line};
 }
 
 // Filament is laid before the reference moves or after it has ended.
@@ -382,9 +377,8 @@ Meter::Sample Meter::look_at_rest(const dynamics::NozzleMotionXY& nozzle, double
   bundle_.look(*path_, near_, since_s);
   const gcode::Segment& segment = (*path_)[piece].move.segment;
   const gcode::Position& at = before ? segment.start_mm : segment.end_mm;
-  const double error_x = at[gcode::X] - nozzle.x.position;
-  const double error_y = at[gcode::Y] - nozzle.y.position;
-  return {error_x * error_x + error_y * error_y, (*path_)[bundle_.nearest()].move.segment.line};
+  return {squared(xy_of(at) - dynamics::place_mm(nozzle)),
+          (*path_)[bundle_.nearest()].move.segment.line};
 }
 
 // What happens between two looks. laying: filament is laid by what is played now.
@@ -406,17 +400,13 @@ void Meter::count(const Sample& from, const Sample& to, const ReferencePhase& re
     return;
   }
   if (laying && follow_feed_ && (*path_)[bundle_.nearest()].extruding) {
-    const double v_x = nozzle.x.velocity;
-    const double v_y = nozzle.y.velocity;
-    feed_.add(v_x * v_x + v_y * v_y, (*path_)[bundle_.nearest()].move.segment.feed_mm_s, h,
-              to.line);
+    feed_.add(squared(dynamics::velocity_mm_s(nozzle)),
+              (*path_)[bundle_.nearest()].move.segment.feed_mm_s, h, to.line);
   }
   if (follow_lag_) {
-    const double v_x = reference.x.velocity;
-    const double v_y = reference.y.velocity;
-    lag_.add((reference.x.position - nozzle.x.position) * v_x +
-                 (reference.y.position - nozzle.y.position) * v_y,
-             v_x * v_x + v_y * v_y, h);
+    const XY v_mm_s = dynamics::velocity_mm_s(reference.xy);
+    lag_.add(dot(dynamics::place_mm(reference.xy) - dynamics::place_mm(nozzle), v_mm_s),
+             squared(v_mm_s), h);
   }
 }
 
@@ -425,8 +415,8 @@ void Meter::count(const Sample& from, const Sample& to, const ReferencePhase& re
 std::optional<PathPlace> Meter::place(bool measured, const ReferencePhase& reference,
                                       const dynamics::NozzleMotionXY& nozzle) const {
   if (measured) {
-    return nearest_place(*path_, current_, reference.x.position, reference.y.position,
-                         nozzle.x.position, nozzle.y.position);
+    return nearest_place(*path_, current_, dynamics::place_mm(reference.xy),
+                         dynamics::place_mm(nozzle));
   }
   if (path_->first() == path_->end()) {
     return std::nullopt;
@@ -441,15 +431,13 @@ void Meter::tell(const BasePhase& phase, double h, bool measured, const Referenc
   NozzleStep step;
   step.time_s = time_s_;
   step.h_s = h;
-  step.base_x = phase.x;
-  step.base_y = phase.y;
+  step.base = phase.xy;
   step.extruding = phase.extruding;
   step.line = sample.line;
   step.measured = measured;
   step.waiting = waiting_;
   if (measured) {
-    step.reference_x_mm = reference.x.position;
-    step.reference_y_mm = reference.y.position;
+    step.reference_mm = dynamics::place_mm(reference.xy);
     step.piece = current_;
   }
   for (std::size_t number = 0; number < bundle_.count(); ++number) {
@@ -485,9 +473,7 @@ void Meter::wait_for_reference() {
   waiting_ = true;
   path_->extend_to(time_s_ + kSameTime_s);
   while (path_->end_s() - time_s_ > kSameTime_s) {
-    play(BasePhase{.x = {base_x_mm_, 0.0, 0.0},
-                   .y = {base_y_mm_, 0.0, 0.0},
-                   .duration_s = path_->end_s() - time_s_});
+    play(BasePhase{.xy = resting_at(base_mm_), .duration_s = path_->end_s() - time_s_});
     path_->extend_to(time_s_ + kSameTime_s);
   }
   waiting_ = false;
@@ -501,7 +487,7 @@ void Meter::wait_for_reference() {
 }
 
 void Meter::hold(double duration_s) {
-  bundle_.settle({base_x_mm_, 0.0, 0.0}, {base_y_mm_, 0.0, 0.0}, duration_s);
+  bundle_.settle(resting_at(base_mm_), duration_s);
   last_look_.reset();
   if (line_) {
     line_->rest(duration_s);

@@ -107,7 +107,7 @@ class Meter {
   }
 
   // The first nozzle and the base at the very start.
-  void set_state(const NozzleXY& nozzle, double base_x_mm, double base_y_mm);
+  void set_state(const NozzleXY& nozzle, const XY& base_mm);
   // Measures against this path from now on. The path must live as long. The clock is set to
   // unplayed_s before the start of the path's current section. unplayed_mm: filament that is still
   // to come before the section begins, counted as in BasePhase::e.
@@ -123,7 +123,7 @@ class Meter {
   // Moves the base by a phase while nothing is measured and the clock stands.
   void settle(const BasePhase& phase);
   // Shifts base and nozzle, so that the base is at this place.
-  void shift_to(double x_mm, double y_mm);
+  void shift_to(const XY& place_mm);
   // Measures the present moment with weight zero, so that it counts for the largest errors.
   void look();
   // The base stands still until the reference has ended, and the nozzle is measured meanwhile. Then
@@ -161,8 +161,7 @@ class Meter {
 
   [[nodiscard]] double time_s() const { return time_s_; }
   [[nodiscard]] NozzleXY nozzle() const { return bundle_.nozzle(); }
-  [[nodiscard]] double base_x_mm() const { return base_x_mm_; }
-  [[nodiscard]] double base_y_mm() const { return base_y_mm_; }
+  [[nodiscard]] const XY& base_mm() const { return base_mm_; }
   [[nodiscard]] const DeviationAccumulator& extruding() const { return extruding_; }
   [[nodiscard]] const DeviationAccumulator& all() const { return all_; }
   [[nodiscard]] double reach_s() const { return near_.reach_s(); }
@@ -178,8 +177,7 @@ class Meter {
  private:
   // The reference during one phase of one of its moves.
   struct ReferencePhase {
-    dynamics::BaseSegment x;
-    dynamics::BaseSegment y;
+    dynamics::BaseXY xy;
     bool extruding = false;
   };
 
@@ -213,8 +211,7 @@ class Meter {
   // What was seen last, if it is what the next step begins with.
   std::optional<Sample> last_look_;
   bool last_measured_ = false;
-  double base_x_mm_ = 0.0;
-  double base_y_mm_ = 0.0;
+  XY base_mm_;
   std::size_t current_ = 0;  // piece of the reference at time_s_
   NearPath near_;
   DeviationAccumulator extruding_;

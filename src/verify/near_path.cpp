@@ -14,7 +14,9 @@ constexpr double kClockReach_s = 0.02;
 
 double reach_s(const NozzleModel& model) {
   return kClockReach_s +
-         std::numbers::pi / std::min(model.x.slowest_rad_s(), model.y.slowest_rad_s());
+         std::numbers::pi /
+             least_of_axes([](const dynamics::FlexibleAxis& axis) { return axis.slowest_rad_s(); },
+                           model);
 }
 
 void NearPath::begin(const ReferencePath& path) {
@@ -32,8 +34,8 @@ void NearPath::add_span(const PathPiece& piece) {
     spans_.erase(spans_.begin(), spans_.begin() + static_cast<std::ptrdiff_t>(dropped_));
     dropped_ = 0;
   }
-  spans_.push_back({piece.x_mm, piece.y_mm, piece.direction_x, piece.direction_y,
-                    piece.length_xy_mm, piece.start_s, piece.end_s});
+  spans_.push_back(
+      {piece.start_mm, piece.direction, piece.length_xy_mm, piece.start_s, piece.end_s});
   ++end_;
 }
 

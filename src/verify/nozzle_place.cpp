@@ -16,28 +16,22 @@ struct Foot {
   double distance2_mm2 = std::numeric_limits<double>::infinity();
 };
 
-Foot foot_on(const PathPiece& piece, double x_mm, double y_mm) {
-  const double x = x_mm - piece.x_mm;
-  const double y = y_mm - piece.y_mm;
-  const double along =
-      std::clamp(x * piece.direction_x + y * piece.direction_y, 0.0, piece.length_xy_mm);
-  const double across_x = x - along * piece.direction_x;
-  const double across_y = y - along * piece.direction_y;
-  return {along, across_x * across_x + across_y * across_y};
+Foot foot_on(const PathPiece& piece, const XY& place_mm) {
+  const XY off_mm = place_mm - piece.start_mm;
+  const double along_mm = std::clamp(dot(off_mm, piece.direction), 0.0, piece.length_xy_mm);
+  return {along_mm, squared(off_mm - along_mm * piece.direction)};
 }
 
 }  // namespace
 
-PathPlace nearest_place(const ReferencePath& path, std::size_t current, double r_x_mm,
-                        double r_y_mm, double p_x_mm, double p_y_mm) {
-  const double off_x_mm = p_x_mm - r_x_mm;
-  const double off_y_mm = p_y_mm - r_y_mm;
-  const double reach_mm = kSearch * std::sqrt(off_x_mm * off_x_mm + off_y_mm * off_y_mm);
-  const double reference_mm = foot_on(path[current], r_x_mm, r_y_mm).along_mm;
+PathPlace nearest_place(const ReferencePath& path, std::size_t current, const XY& r_mm,
+                        const XY& p_mm) {
+  const double reach_mm = kSearch * std::sqrt(squared(p_mm - r_mm));
+  const double reference_mm = foot_on(path[current], r_mm).along_mm;
   Foot best;
   std::size_t nearest = current;
   const auto look_at = [&](std::size_t number) {
-    const Foot foot = foot_on(path[number], p_x_mm, p_y_mm);
+    const Foot foot = foot_on(path[number], p_mm);
     if (foot.distance2_mm2 < best.distance2_mm2) {
       best = foot;
       nearest = number;

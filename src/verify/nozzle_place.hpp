@@ -3,6 +3,7 @@
 
 #include <cstddef>
 
+#include "unflex/core/xy.hpp"
 #include "unflex/verify/reference_path.hpp"
 
 namespace unflex::verify {
@@ -15,7 +16,7 @@ struct PathPlace {
 // The place that is nearest to the nozzle p. The path may come close to itself, so it is searched
 // only around the reference r, which is on the piece `current`, and no further than a few times
 // |p − r|.
-[[nodiscard]] PathPlace nearest_place(const ReferencePath& path, std::size_t current, double r_x_mm,
-                                      double r_y_mm, double p_x_mm, double p_y_mm);
+[[nodiscard]] PathPlace nearest_place(const ReferencePath& path, std::size_t current,
+                                      const XY& r_mm, const XY& p_mm);
 
 }  // namespace unflex::verify

@@ -26,9 +26,7 @@ double Nozzles::plan_time_s() const {
   return main_.time_s() + (shaped_ ? shaped_->unplayed_s() : 0.0);
 }
 
-double Nozzles::plan_x_mm() const { return shaped_ ? to_mm_[gcode::X] : main_.base_x_mm(); }
-
-double Nozzles::plan_y_mm() const { return shaped_ ? to_mm_[gcode::Y] : main_.base_y_mm(); }
+XY Nozzles::plan_mm() const { return shaped_ ? xy_of(to_mm_) : main_.base_mm(); }
 
 void Nozzles::begin_section(ReferencePath& path) {
   const double unplayed_s = shaped_ ? shaped_->unplayed_s() : 0.0;
@@ -48,7 +46,7 @@ void Nozzles::play(const planner::PlannedMove& move, const planner::PlannedMove&
     return;
   }
   const gcode::Position& from = move.segment.start_mm;
-  if (!shaped_ || from[gcode::X] != to_mm_[gcode::X] || from[gcode::Y] != to_mm_[gcode::Y]) {
+  if (!shaped_ || xy_of(from) != xy_of(to_mm_)) {
     finish();
     begin_shaped(from);
   }
@@ -61,11 +59,11 @@ void Nozzles::play(const planner::PlannedMove& move, const planner::PlannedMove&
 // The base moves before the plan, while the machine still stands. So the nozzles' clock goes back
 // by that much, but no further than the machine has stood.
 void Nozzles::begin_shaped(const gcode::Position& from) {
-  shaped_.emplace(shaping_, from[gcode::X], from[gcode::Y]);
+  shaped_.emplace(shaping_, xy_of(from));
   before_plan_s_ = shaped_->lead_s();
   const double back_s = std::min(before_plan_s_, rested_s_);
   main_.hold(-back_s);
-  main_.shift_to(from[gcode::X], from[gcode::Y]);
+  main_.shift_to(xy_of(from));
   rested_s_ = 0.0;
 }
 

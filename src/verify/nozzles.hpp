@@ -34,8 +34,7 @@ class Nozzles {
   // The clock of the moves that have been played; the nozzles are no further than that.
   [[nodiscard]] double plan_time_s() const;
   // Where the moves that have been played end.
-  [[nodiscard]] double plan_x_mm() const;
-  [[nodiscard]] double plan_y_mm() const;
+  [[nodiscard]] XY plan_mm() const;
 
   void begin_section(ReferencePath& path);
   // Sets how the printer's own shaper changes the motion from now on.

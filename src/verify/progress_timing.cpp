@@ -124,11 +124,14 @@ ProgressTiming::Place ProgressTiming::first_agreeing(Place from) {
 // is as long as the base's.
 ProgressTiming::Place ProgressTiming::nearest(Place from, const gcode::Position& base_mm,
                                               double expected_mm) {
+  const XY base_xy_mm = xy_of(base_mm);
   Place best = from;
   double least = std::numeric_limits<double>::infinity();
   for (Place place = from;;) {
     const Sliced& on = sliced_[place.move];
     const gcode::Segment& segment = on.reference.move.segment;
+    const XY start_mm = xy_of(segment.start_mm);
+    const XY way_mm = xy_of(segment.end_mm) - start_mm;
     const double delta_mm = segment.delta(gcode::E);
     // Where Q leaves F behind on this move.
     double until_mm = on.length_mm;
@@ -139,18 +142,13 @@ ProgressTiming::Place ProgressTiming::nearest(Place from, const gcode::Position&
     until_mm = std::max(until_mm, place.along_mm);
     double along_mm = until_mm;
     if (on.length_mm > 0.0) {
-      const double x = base_mm[gcode::X] - segment.start_mm[gcode::X];
-      const double y = base_mm[gcode::Y] - segment.start_mm[gcode::Y];
-      along_mm = (x * segment.delta(gcode::X) + y * segment.delta(gcode::Y)) / on.length_mm;
+      along_mm = dot(base_xy_mm - start_mm, way_mm) / on.length_mm;
       along_mm = std::clamp(along_mm, place.along_mm, until_mm);
     }
     const double share = on.length_mm > 0.0 ? along_mm / on.length_mm : 1.0;
-    const double off_x =
-        segment.start_mm[gcode::X] + share * segment.delta(gcode::X) - base_mm[gcode::X];
-    const double off_y =
-        segment.start_mm[gcode::Y] + share * segment.delta(gcode::Y) - base_mm[gcode::Y];
+    const XY off_mm = start_mm + share * way_mm - base_xy_mm;
     const double ahead_mm = on.begin_mm + along_mm - expected_mm;
-    const double cost = off_x * off_x + off_y * off_y + kAsExpected * ahead_mm * ahead_mm;
+    const double cost = squared(off_mm) + kAsExpected * ahead_mm * ahead_mm;
     if (cost <= least) {
       least = cost;
       best = {place.move, along_mm};

@@ -12,9 +12,9 @@ constexpr std::size_t kDropBatch = 1024;
 
 }  // namespace
 
-planner::PlannedMove resting(double x_mm, double y_mm, double duration_s) {
+planner::PlannedMove resting(const XY& place_mm, double duration_s) {
   planner::PlannedMove move;
-  move.segment.start_mm = {x_mm, y_mm, 0.0, 0.0};
+  move.segment.start_mm = {place_mm.x, place_mm.y, 0.0, 0.0};
   move.segment.end_mm = move.segment.start_mm;
   move.cruise_s = duration_s;
   return move;
@@ -61,8 +61,8 @@ void ReferencePath::extend_to(double t) {
   }
 }
 
-void ReferencePath::hold(double x_mm, double y_mm, double duration_s) {
-  append({resting(x_mm, y_mm, duration_s), {}}, true);
+void ReferencePath::hold(const XY& place_mm, double duration_s) {
+  append({resting(place_mm, duration_s), {}}, true);
 }
 
 void ReferencePath::append(ReferenceMove reference, bool measured) {
@@ -73,12 +73,10 @@ void ReferencePath::append(ReferenceMove reference, bool measured) {
   piece.section = section_;
   piece.start_s = end_s_;
   piece.end_s = end_s_ + duration_s;
-  piece.x_mm = move.segment.start_mm[gcode::X];
-  piece.y_mm = move.segment.start_mm[gcode::Y];
+  piece.start_mm = xy_of(move.segment.start_mm);
   piece.length_xy_mm = move.segment.length_xy_mm();
   if (piece.length_xy_mm > 0.0) {
-    piece.direction_x = move.segment.delta(gcode::X) / piece.length_xy_mm;
-    piece.direction_y = move.segment.delta(gcode::Y) / piece.length_xy_mm;
+    piece.direction = (xy_of(move.segment.end_mm) - piece.start_mm) / piece.length_xy_mm;
   }
   piece.extruding = move.segment.extruding();
   piece.filament_mm = filament_mm_;

@@ -49,7 +49,7 @@ class Differences {
 std::string modal_difference(const gcode::ModalState& input, const gcode::ModalState& output) {
   Differences differences;
   constexpr std::array<std::string_view, 3> kNames = {"X", "Y", "Z"};
-  for (const std::size_t axis : {gcode::X, gcode::Y, gcode::Z}) {
+  for (std::size_t axis = 0; axis < kNames.size(); ++axis) {
     differences.compare(kNames[axis], input.position_mm[axis], output.position_mm[axis],
                         kPositionTolerance_mm);
     differences.compare(fmt::format("{} origin", kNames[axis]), input.base_mm[axis],

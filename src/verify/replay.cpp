@@ -291,8 +291,7 @@ void Replay::place(gcode::Line line, const Regime& before, bool motion) {
   }
   PlacedLine placed;
   placed.line = std::move(line);
-  placed.x_mm = before.modal.position_mm[gcode::X];
-  placed.y_mm = before.modal.position_mm[gcode::Y];
+  placed.place_mm = xy_of(before.modal.position_mm);
   placed.pushed_mm = pushed_mm_;
   placed.motion = motion;
   placed.section = sections_.back().id;

@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "plan_queue.hpp"
+#include "unflex/core/xy.hpp"
 #include "unflex/gcode/interpreter.hpp"
 #include "unflex/gcode/line.hpp"
 #include "unflex/planner/planner.hpp"
@@ -63,8 +64,7 @@ struct Section {
 // A line that is no section, and where the machine is when it comes.
 struct PlacedLine {
   gcode::Line line;
-  double x_mm = 0.0;
-  double y_mm = 0.0;
+  XY place_mm;
   double pushed_mm = 0.0;  // filament pushed so far, without what was drawn back
   bool motion = false;     // G0 to G3 with an axis or E
   std::size_t section = 0;

@@ -17,29 +17,34 @@ void Excursion::add(const gcode::Segment& segment) {
 }
 
 void Excursion::add(const gcode::Position& at, std::size_t line) {
-  const double x = at[gcode::X];
-  const double y = at[gcode::Y];
-  const std::array<double, 4> beyond = {travel_->x_min_mm - x, x - travel_->x_max_mm,
-                                        travel_->y_min_mm - y, y - travel_->y_max_mm};
-  for (std::size_t side = 0; side < sides_.size(); ++side) {
-    if (beyond[side] > sides_[side].beyond_mm) {
-      sides_[side] = {beyond[side], line, x, y};
-    }
-  }
+  const XY place_mm = xy_of(at);
+  for_each_axis(
+      [&](const TravelRange& travel, double at_mm, std::array<Side, 2>& sides) {
+        const std::array<double, 2> beyond_mm = {travel.min_mm - at_mm, at_mm - travel.max_mm};
+        for (std::size_t side = 0; side < sides.size(); ++side) {
+          if (beyond_mm[side] > sides[side].beyond_mm) {
+            sides[side] = {beyond_mm[side], line, place_mm};
+          }
+        }
+      },
+      *travel_, place_mm, sides_);
 }
 
 const Excursion::Side* Excursion::worse_than(const Excursion& input) const {
-  const std::array<bool, 4> assumed = {travel_->x_min_assumed, false, travel_->y_min_assumed,
-                                       false};
-  for (std::size_t side = 0; side < sides_.size(); ++side) {
-    if (assumed[side] && input.sides_[side].beyond_mm > 0.0) {
-      continue;
-    }
-    if (sides_[side].beyond_mm > input.sides_[side].beyond_mm + kRounding_mm) {
-      return &sides_[side];
-    }
-  }
-  return nullptr;
+  const Side* worse = nullptr;
+  for_each_axis(
+      [&](const TravelRange& travel, const std::array<Side, 2>& sides,
+          const std::array<Side, 2>& input_sides) {
+        for (std::size_t side = 0; side < sides.size(); ++side) {
+          const bool is_assumed = side == 0 && travel.min_assumed;
+          if (worse == nullptr && !(is_assumed && input_sides[side].beyond_mm > 0.0) &&
+              sides[side].beyond_mm > input_sides[side].beyond_mm + kRounding_mm) {
+            worse = &sides[side];
+          }
+        }
+      },
+      *travel_, sides_, input.sides_);
+  return worse;
 }
 
 void BaseCheck::Largest::offer(double a_value, std::size_t a_line) {
@@ -64,23 +69,29 @@ void BaseCheck::go_on(const planner::PlannedMove& before) {
   }
 }
 
-BaseCheck::PerMotor BaseCheck::of_motors(double x, double y, double z) const {
+BaseCheck::PerMotor BaseCheck::of_motors(const gcode::Position& axes) const {
   PerMotor result{};
   for (std::size_t i = 0; i < result.size(); ++i) {
-    result[i] = motors_.moves_xy(i) ? motors_.of(i, x, y, z) : 0.0;
+    result[i] = motors_.moves_xy(i) ? motors_.of(i, axes) : 0.0;
   }
   return result;
 }
 
 BaseCheck::PerMotor BaseCheck::mean_velocity(const planner::PlannedMove& move) const {
   const double duration = move.duration_s();
-  return of_motors(move.segment.delta(gcode::X) / duration, move.segment.delta(gcode::Y) / duration,
-                   move.segment.delta(gcode::Z) / duration);
+  gcode::Position mean_mm_s{};
+  for (std::size_t axis = 0; axis < mean_mm_s.size(); ++axis) {
+    mean_mm_s[axis] = (move.segment.end_mm[axis] - move.segment.start_mm[axis]) / duration;
+  }
+  return of_motors(mean_mm_s);
 }
 
 BaseCheck::PerMotor BaseCheck::velocity_at(const planner::PlannedMove& move, double v_mm_s) const {
-  return of_motors(v_mm_s * move.direction[gcode::X], v_mm_s * move.direction[gcode::Y],
-                   v_mm_s * move.direction[gcode::Z]);
+  gcode::Position of_axes_mm_s{};
+  for (std::size_t axis = 0; axis < of_axes_mm_s.size(); ++axis) {
+    of_axes_mm_s[axis] = v_mm_s * move.direction[axis];
+  }
+  return of_motors(of_axes_mm_s);
 }
 
 void BaseCheck::add(const planner::PlannedMove& move) {

@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "unflex/core/xy.hpp"
 #include "unflex/verify/log_histogram.hpp"
 #include "unflex/verify/verify.hpp"
 #include "violations.hpp"
@@ -29,8 +30,7 @@ class Excursion {
   struct Side {
     double beyond_mm = 0.0;
     std::size_t line = 0;
-    double x_mm = 0.0;
-    double y_mm = 0.0;
+    XY place_mm;
   };
   // A side on which this file, the emitted one, goes out of the travel, and further than the
   // sliced file (`input`) does in this section; nullptr if there is none.
@@ -40,7 +40,8 @@ class Excursion {
   void add(const gcode::Position& at, std::size_t line);
 
   const TravelLimits* travel_;
-  std::array<Side, 4> sides_{};
+  // Below the least place and above the largest, for each axis.
+  Axes<std::array<Side, 2>> sides_{};
 };
 
 // Velocity and acceleration of the base in compensated runs.
@@ -77,7 +78,7 @@ class BaseCheck {
   };
   using PerMotor = std::array<double, Motors::kCount>;
   // Motion of each motor for a motion of the axes; 0 for motors that move neither X nor Y.
-  [[nodiscard]] PerMotor of_motors(double x, double y, double z) const;
+  [[nodiscard]] PerMotor of_motors(const gcode::Position& axes) const;
   [[nodiscard]] PerMotor mean_velocity(const planner::PlannedMove& move) const;
   // Velocity of each motor where the move has this speed along its path.
   [[nodiscard]] PerMotor velocity_at(const planner::PlannedMove& move, double v_mm_s) const;

@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "unflex/core/math.hpp"
-
 namespace unflex::verify {
 namespace {
 
@@ -37,9 +35,12 @@ double SectionRules::largest_offset_mm(double max_accel_mm_s2, double v_mm_s) co
   // Where the timing is free, the spring may throw the nozzle round a corner faster than the base
   // could.
   constexpr double kTimesInFreeTiming = 2.5;
-  return kRounding_mm + (has_free_timing_ ? kTimesInFreeTiming : 1.0) *
-                            math::hypot(rules_->nozzle.x.largest_lag_mm(max_accel_mm_s2, v_mm_s),
-                                        rules_->nozzle.y.largest_lag_mm(max_accel_mm_s2, v_mm_s));
+  const XY lag_mm = map_axes(
+      [&](const dynamics::FlexibleAxis& axis) {
+        return axis.largest_lag_mm(max_accel_mm_s2, v_mm_s);
+      },
+      rules_->nozzle);
+  return kRounding_mm + (has_free_timing_ ? kTimesInFreeTiming : 1.0) * length(lag_mm);
 }
 
 void SectionRules::Breach::offer(double a_value, double limit, std::size_t a_line) {

@@ -22,6 +22,10 @@ dynamics::BaseSegment along_filament(const planner::PlannedMove& move, double fi
 
 }  // namespace
 
+dynamics::BaseXY resting_at(const XY& place_mm) {
+  return map_axes([](double at_mm) { return dynamics::BaseSegment{at_mm, 0.0, 0.0}; }, place_mm);
+}
+
 void append_phases(const planner::PlannedMove& move, double pushed_mm,
                    std::vector<BasePhase>& phases) {
   double elapsed_s = 0.0;
@@ -34,12 +38,12 @@ void append_phases(const planner::PlannedMove& move, double pushed_mm,
       continue;
     }
     const double distance_mm = move.distance_mm(elapsed_s);
-    const auto along = [&](gcode::Axis axis) {
-      const double ratio = move.kinematic ? move.direction[axis] : 0.0;
-      return dynamics::BaseSegment{move.segment.start_mm[axis] + ratio * distance_mm,
-                                   ratio * phase.speed_mm_s, ratio * phase.accel_mm_s2};
+    const auto along = [&](double start_mm, double direction) {
+      const double ratio = move.kinematic ? direction : 0.0;
+      return dynamics::BaseSegment{start_mm + ratio * distance_mm, ratio * phase.speed_mm_s,
+                                   ratio * phase.accel_mm_s2};
     };
-    phases.push_back({along(gcode::X), along(gcode::Y),
+    phases.push_back({map_axes(along, xy_of(move.segment.start_mm), xy_of(move.direction)),
                       along_filament(move, laid_mm, distance_mm, phase),
                       along_filament(move, pushed_mm, distance_mm, phase), phase.duration_s,
                       move.segment.extruding()});
@@ -47,7 +51,7 @@ void append_phases(const planner::PlannedMove& move, double pushed_mm,
   }
 }
 
-ShapedBase::ShapedBase(const planner::Shaping& shaping, double x_mm, double y_mm)
+ShapedBase::ShapedBase(const planner::Shaping& shaping, const XY& place_mm)
     : lead_s_(shaping.lead_s()) {
   const auto set = [&](std::vector<Tap>& taps, const dynamics::ShaperPulses& pulses) {
     if (pulses.empty()) {
@@ -59,12 +63,11 @@ ShapedBase::ShapedBase(const planner::Shaping& shaping, double x_mm, double y_mm
     }
   };
   memory_s_ = lead_s_;
-  set(x_, shaping.x);
-  set(y_, shaping.y);
+  for_each_axis(set, xy_, shaping);
   set(e_, {});
   // The base has rested for as long as the pulses look back.
   given_until_s_ = -memory_s_ - 1.0;
-  give({.x = {x_mm, 0.0, 0.0}, .y = {y_mm, 0.0, 0.0}, .duration_s = memory_s_ + 1.0});
+  give({.xy = resting_at(place_mm), .duration_s = memory_s_ + 1.0});
 }
 
 void ShapedBase::give(const BasePhase& phase) {
@@ -93,23 +96,42 @@ void ShapedBase::rest(double duration_s, std::vector<BasePhase>& shaped) {
     return;
   }
   const Timed& last = given_.back();
-  BasePhase rest{.x = later(last.phase.x, last.phase.duration_s),
-                 .y = later(last.phase.y, last.phase.duration_s),
-                 .e = {filament_mm_, 0.0, 0.0},
-                 .duration_s = duration_s};
-  rest.x.velocity = rest.x.acceleration = 0.0;
-  rest.y.velocity = rest.y.acceleration = 0.0;
-  give(rest);
+  const auto at_end = [&](const dynamics::BaseSegment& base) {
+    return later(base, last.phase.duration_s).position;
+  };
+  give({.xy = resting_at(map_axes(at_end, last.phase.xy)),
+        .e = {filament_mm_, 0.0, 0.0},
+        .duration_s = duration_s});
   advance(shaped);
+}
+
+template <typename Part>
+dynamics::BaseSegment ShapedBase::sum(const std::vector<Tap>& taps, const Part& part) const {
+  dynamics::BaseSegment result;
+  for (const Tap& tap : taps) {
+    const Timed& at = given_[tap.index - forgotten_];
+    const dynamics::BaseSegment base = later(part(at.phase), time_s_ - tap.delay_s - at.start_s);
+    result.position += tap.weight * base.position;
+    result.velocity += tap.weight * base.velocity;
+    result.acceleration += tap.weight * base.acceleration;
+  }
+  return result;
 }
 
 void ShapedBase::advance(std::vector<BasePhase>& shaped) {
   while (given_until_s_ - time_s_ > kSameTime_s) {
-    const double until_s =
-        std::min({given_until_s_, next_change(x_), next_change(y_), next_change(e_)});
-    shaped.push_back({sum(x_, &BasePhase::x), sum(y_, &BasePhase::y), sum(e_, &BasePhase::e),
-                      sum(e_, &BasePhase::pushed), until_s - time_s_,
-                      given_[e_.front().index - forgotten_].phase.extruding});
+    double until_s = std::min(given_until_s_, next_change(e_));
+    for_each_axis([&](std::vector<Tap>& taps) { until_s = std::min(until_s, next_change(taps)); },
+                  xy_);
+    BasePhase phase;
+    for (std::size_t axis = 0; axis < dynamics::BaseXY::kCount; ++axis) {
+      phase.xy[axis] = sum(xy_[axis], [axis](const BasePhase& of) { return of.xy[axis]; });
+    }
+    phase.e = sum(e_, [](const BasePhase& of) { return of.e; });
+    phase.pushed = sum(e_, [](const BasePhase& of) { return of.pushed; });
+    phase.duration_s = until_s - time_s_;
+    phase.extruding = given_[e_.front().index - forgotten_].phase.extruding;
+    shaped.push_back(phase);
     time_s_ = until_s;
   }
   while (given_.size() > 1 && given_[1].start_s <= time_s_ - memory_s_) {
@@ -133,19 +155,6 @@ double ShapedBase::next_change(std::vector<Tap>& taps) {
     change_s = std::min(change_s, at.start_s + at.phase.duration_s + tap.delay_s);
   }
   return change_s;
-}
-
-dynamics::BaseSegment ShapedBase::sum(const std::vector<Tap>& taps,
-                                      dynamics::BaseSegment BasePhase::*axis) const {
-  dynamics::BaseSegment result;
-  for (const Tap& tap : taps) {
-    const Timed& at = given_[tap.index - forgotten_];
-    const dynamics::BaseSegment base = later(at.phase.*axis, time_s_ - tap.delay_s - at.start_s);
-    result.position += tap.weight * base.position;
-    result.velocity += tap.weight * base.velocity;
-    result.acceleration += tap.weight * base.acceleration;
-  }
-  return result;
 }
 
 }  // namespace unflex::verify

@@ -21,8 +21,7 @@ namespace unflex::verify {
 
 // Both axes during a time in which neither changes its acceleration.
 struct BasePhase {
-  dynamics::BaseSegment x;
-  dynamics::BaseSegment y;
+  dynamics::BaseXY xy;
   // Filament that comes out meanwhile, counted from the start of the move or of the shaped motion.
   dynamics::BaseSegment e = {};
   // Filament that the extruder pushes in moves of X or Y, without wipes. It may draw some back
@@ -32,6 +31,9 @@ struct BasePhase {
   bool extruding = false;  // the move lays filament
 };
 
+// The base that stands still at a place.
+[[nodiscard]] dynamics::BaseXY resting_at(const XY& place_mm);
+
 // Appends the phases of one move, except those without duration. pushed_mm: what the extruder
 // pushes meanwhile, if that is not what comes out.
 void append_phases(const planner::PlannedMove& move, double pushed_mm,
@@ -39,8 +41,8 @@ void append_phases(const planner::PlannedMove& move, double pushed_mm,
 
 class ShapedBase {
  public:
-  // The base rests at x, y.
-  ShapedBase(const planner::Shaping& shaping, double x_mm, double y_mm);
+  // The base rests at this place.
+  ShapedBase(const planner::Shaping& shaping, const XY& place_mm);
 
   // Takes the next move and appends the shaped motion that is known by then. Shaped motion begins
   // lead_s() before the first move, so it lasts as long as the motion given so far. A phase ends
@@ -72,11 +74,11 @@ class ShapedBase {
   void rest(double duration_s, std::vector<BasePhase>& shaped);
   void advance(std::vector<BasePhase>& shaped);
   [[nodiscard]] double next_change(std::vector<Tap>& taps);
-  [[nodiscard]] dynamics::BaseSegment sum(const std::vector<Tap>& taps,
-                                          dynamics::BaseSegment BasePhase::*axis) const;
+  // part: what of a phase the taps add up.
+  template <typename Part>
+  [[nodiscard]] dynamics::BaseSegment sum(const std::vector<Tap>& taps, const Part& part) const;
 
-  std::vector<Tap> x_;
-  std::vector<Tap> y_;
+  Axes<std::vector<Tap>> xy_;
   std::vector<Tap> e_;
   double lead_s_ = 0.0;
   double memory_s_ = 0.0;

@@ -72,10 +72,7 @@ void StepGauge::play(const planner::PlannedMove& move) {
   std::array<double, kStepMotors> hz{};
   std::array<double, kStepMotors> certain_hz{};
   for (std::size_t i = 0; i < hz.size(); ++i) {
-    const double share = i == kFilament
-                             ? move.direction[gcode::E]
-                             : motors_.of(i, move.direction[gcode::X], move.direction[gcode::Y],
-                                          move.direction[gcode::Z]);
+    const double share = i == kFilament ? move.direction[gcode::E] : motors_.of(i, move.direction);
     const double uncertainty = i == kFilament ? 1.0 : motors_.uncertainty(i);
     hz[i] = rules_.steps_per_mm[i] * std::abs(share) * v;
     certain_hz[i] =

@@ -54,8 +54,7 @@ bool Track::takes_shaper() {
     return false;
   }
   const gcode::Shaper shaper = section().regime->modal.input_shaper();
-  const bool differs = shaper.freq_x_hz != shaper_.freq_x_hz ||
-                       shaper.freq_y_hz != shaper_.freq_y_hz || shaper.settings != shaper_.settings;
+  const bool differs = shaper.freq_hz != shaper_.freq_hz || shaper.settings != shaper_.settings;
   shaper_ = shaper;
   return differs;
 }

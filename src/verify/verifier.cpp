@@ -1,6 +1,7 @@
 #include "verifier.hpp"
 
 #include <algorithm>
+#include <functional>
 #include <limits>
 #include <utility>
 
@@ -19,7 +20,8 @@ constexpr double kLate_s = 5e-4;
 constexpr double kRingsFor_s = 1.0;
 
 double place_tolerance_mm(const Rules& rules, double base_max_accel_mm_s2) {
-  const double omega = std::min(rules.nozzle.x.slowest_rad_s(), rules.nozzle.y.slowest_rad_s());
+  const double omega = least_of_axes(
+      [](const dynamics::FlexibleAxis& axis) { return axis.slowest_rad_s(); }, rules.nozzle);
   return std::max(kLeastPlaceTolerance_mm, base_max_accel_mm_s2 / (omega * omega)) +
          0.5 * rules.base_max_velocity_mm_s / rules.max_lines_per_s;
 }
@@ -184,7 +186,7 @@ void Verifier::begin_section(bool compensated) {
   if (compensated) {
     const Meter& emitted = emitted_.main();
     kept_.begin_section(paths_.kept());
-    kept_.set_state(emitted.nozzle(), emitted.base_x_mm(), emitted.base_y_mm());
+    kept_.set_state(emitted.nozzle(), emitted.base_mm());
     kept_.skip(paths_.kept_lead_in_s());
   }
   if (observer_ != nullptr) {
@@ -220,8 +222,8 @@ void Verifier::play_run() {
     const gcode::ModalState& modal = output_.section().regime->modal;
     // A macro may have switched on what nobody has told of.
     const gcode::InterpreterOptions& told = rules_.interpreter;
-    const bool is_touched = (modal.shaper_touched_x && told.shaper_unknown_x) ||
-                            (modal.shaper_touched_y && told.shaper_unknown_y);
+    const bool is_touched =
+        any_axis(std::logical_and<>{}, modal.shaper_touched, told.shaper_unknown);
     if (modal.input_shaper().is_on() || modal.input_shaper().is_unknown() || is_touched) {
       violations_.in_output(output_.section().line.number,
                             "the printer's input shaper is on in a compensated run");
@@ -463,9 +465,9 @@ void Verifier::play_kept_line() {
 void Verifier::hold() {
   begin_section(false);
   const double hold_s = rules_.nozzle.hold_s;
-  paths_.sliced().hold(original_.plan_x_mm(), original_.plan_y_mm(), hold_s);
+  paths_.sliced().hold(original_.plan_mm(), hold_s);
   const auto rest = [&](Nozzles& nozzles) {
-    nozzles.play(resting(nozzles.plan_x_mm(), nozzles.plan_y_mm(), hold_s));
+    nozzles.play(resting(nozzles.plan_mm(), hold_s));
     nozzles.finish();
   };
   for_sliced(rest);

@@ -18,16 +18,21 @@ constexpr double kFilamentTolerance_mm = 1.5e-5 + 1e-9;
 // Type and damping of a shaper that is off are of no effect.
 // A shaper that is not known cannot be restored.
 bool same_shaper(const gcode::ModalState& a, const gcode::ModalState& b) {
-  const bool same_x =
-      a.shaper_freq_x_hz == 0.0 ||
-      (a.shaper.type_x == b.shaper.type_x && a.shaper.damping_ratio_x == b.shaper.damping_ratio_x &&
-       a.shaper.custom_words == b.shaper.custom_words);
-  const bool same_y =
-      a.shaper_freq_y_hz == 0.0 ||
-      (a.shaper.type_y == b.shaper.type_y && a.shaper.damping_ratio_y == b.shaper.damping_ratio_y);
-  const bool same_freqs = (a.shaper_unknown_x || a.shaper_freq_x_hz == b.shaper_freq_x_hz) &&
-                          (a.shaper_unknown_y || a.shaper_freq_y_hz == b.shaper_freq_y_hz);
-  return same_freqs && same_x && same_y;
+  const auto is_off = [](double freq_hz) { return freq_hz == 0.0; };
+  const bool same_freqs =
+      all_axes([](bool unknown, double of_a, double of_b) { return unknown || of_a == of_b; },
+               a.shaper_unknown, a.shaper_freq_hz, b.shaper_freq_hz);
+  const bool same_types =
+      all_axes([&](double freq_hz, const auto& of_a,
+                   const auto& of_b) { return is_off(freq_hz) || of_a == of_b; },
+               a.shaper_freq_hz, a.shaper.type, b.shaper.type);
+  const bool same_damping =
+      all_axes([&](double freq_hz, const auto& of_a,
+                   const auto& of_b) { return is_off(freq_hz) || of_a == of_b; },
+               a.shaper_freq_hz, a.shaper.damping_ratio, b.shaper.damping_ratio);
+  const bool same_words =
+      all_axes(is_off, a.shaper_freq_hz) || a.shaper.custom_words == b.shaper.custom_words;
+  return same_freqs && same_types && same_damping && same_words;
 }
 
 }  // namespace
@@ -45,9 +50,9 @@ double Verifier::filament_tolerance_mm() const {
 
 void Verifier::check_run(bool compensated) {
   if (const Excursion::Side* const side = output_.excursion().worse_than(input_.excursion())) {
-    violations_.in_output(
-        side->line, fmt::format("X{:.4f} Y{:.4f} is out of the travel by {:.4f} mm", side->x_mm,
-                                side->y_mm, side->beyond_mm));
+    violations_.in_output(side->line,
+                          fmt::format("X{:.4f} Y{:.4f} is out of the travel by {:.4f} mm",
+                                      side->place_mm.x, side->place_mm.y, side->beyond_mm));
   }
   if (output_.too_much_line() != 0 && input_.too_much_line() == 0) {
     violations_.in_output(output_.too_much_line(),

@@ -36,7 +36,7 @@ flow::Inspection sample() {
   i.moving_time_s = 2450.0;
   i.filament_mm = 1234.5;
   i.path_length_mm = 99999.0;
-  i.x_max_mm = 120.0;
+  i.max_mm.x = 120.0;
   i.absolute_e = true;
   i.lowest_accel_mm_s2 = 500.0;
   i.highest_accel_mm_s2 = 1500.0;

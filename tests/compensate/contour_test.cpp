@@ -29,7 +29,7 @@ compensate::Setup robust(double freq_error) {
 
 Setup with_contour(compensate::Setup setup) {
   setup.jerk_weight = 15.0;
-  setup.contour = Contour{.pairs = pairs_of(setup.x, setup.y)};
+  setup.contour = Contour{.pairs = pairs_of(setup)};
   return setup;
 }
 
@@ -97,7 +97,7 @@ std::vector<planner::PlannedMove> corners() {
 TEST(Pairs, GiveEachModelItsShare) {
   compensate::Setup setup = robust(0.1);
   setup.y.plants = {{kAxis.detuned(0.8), 0.1}, {kAxis.detuned(1.3), 0.25}, {kAxis, 0.15}};
-  const std::vector<ModelPair> pairs = pairs_of(setup.x, setup.y);
+  const std::vector<ModelPair> pairs = pairs_of(setup);
   std::map<std::size_t, double> x;
   std::map<std::size_t, double> y;
   for (const ModelPair& pair : pairs) {
@@ -118,7 +118,7 @@ TEST(Pairs, HoldBothAxesOffTheSameWayMoreOftenThanOppositeWays) {
   const compensate::Setup setup = robust(0.1);
   double same = 0.0;
   double opposite = 0.0;
-  for (const ModelPair& pair : pairs_of(setup.x, setup.y)) {
+  for (const ModelPair& pair : pairs_of(setup)) {
     (pair.x == pair.y ? same : opposite) += pair.x > 0 && pair.y > 0 ? pair.share : 0.0;
   }
   EXPECT_NEAR(same, 0.7 * 2.0 / 3.0, 1e-9);
@@ -128,7 +128,7 @@ TEST(Pairs, HoldBothAxesOffTheSameWayMoreOftenThanOppositeWays) {
 // With one model the pair is alone.
 TEST(Pairs, OfAxesThatAreKnownAreOne) {
   const compensate::Setup setup = setup_for(kAxis, 2e4);
-  const std::vector<ModelPair> pairs = pairs_of(setup.x, setup.y);
+  const std::vector<ModelPair> pairs = pairs_of(setup);
   ASSERT_EQ(pairs.size(), 1U);
   EXPECT_DOUBLE_EQ(pairs[0].share, 1.0);
 }

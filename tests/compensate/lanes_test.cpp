@@ -86,11 +86,11 @@ TEST_F(Lanes, OfTheContourMakeNoDifference) {
     SCOPED_TRACE(::testing::PrintToString(pairs) + " pairs");
     std::vector<Edge> edges;
     for (int i = 0; i < 20; ++i) {
-      const double dx = uniform(random);
-      const double dy = uniform(random);
-      edges.push_back({uniform(random), uniform(random), dx, dy, 1.0 / (dx * dx + dy * dy)});
+      const XY way_mm{uniform(random), uniform(random)};
+      edges.push_back({{uniform(random), uniform(random)}, way_mm, 1.0 / squared(way_mm)});
     }
-    edges[3].inverse_square = edges[3].dx_mm = edges[3].dy_mm = 0.0;
+    edges[3].inverse_square = 0.0;
+    edges[3].way_mm = {};
     std::vector<Reach> reach;
     for (std::size_t k = 0; k < kNodes; ++k) {
       reach.push_back({k / 4, k / 4 + 9});
@@ -123,11 +123,11 @@ TEST_F(Lanes, OfTheContourMakeNoDifference) {
         of->resize(places);
         std::fill_n(of->data(), places, 0.0);
       }
-      const PairNozzles x{nozzles.data(), kModels, of_pair.data()};
-      const PairNozzles y{nozzles.data() + kNodes * kModels, kModels, of_pair.data()};
+      const Axes<PairNozzles> of_axes{{nozzles.data(), kModels, of_pair.data()},
+                                      {nozzles.data() + kNodes * kModels, kModels, of_pair.data()}};
       Followed result;
       for (const bool everywhere : {true, true, false, false}) {
-        result.farthest_mm = kernel.follow(edges, reach, x, y, everywhere, q);
+        result.farthest_mm = kernel.follow(edges, reach, of_axes, everywhere, q);
       }
       LaneArray node_aims;
       LaneArray middle_aims;

@@ -26,7 +26,7 @@ dynamics::AxisTrajectory rise(std::size_t nodes, double factor) {
   return base;
 }
 
-dynamics::BaseTrajectory rise_of_both() { return {kPeriod_s, rise(101, 1.0), rise(101, -0.5)}; }
+dynamics::BaseTrajectory rise_of_both() { return {{rise(101, 1.0), rise(101, -0.5)}, kPeriod_s}; }
 
 Setup shaped_setup() {
   Setup setup;
@@ -84,7 +84,7 @@ TEST(SecondStage, KeepsEvenMotionAsItIs) {
     even.velocity_mm_s.push_back(100.0);
     even.accel_mm_s2.push_back(0.0);
   }
-  const dynamics::BaseTrajectory made = shaped({kPeriod_s, even, even}, shaped_setup(), 0, 0);
+  const dynamics::BaseTrajectory made = shaped({{even, even}, kPeriod_s}, shaped_setup(), 0, 0);
   for (std::size_t k = 20; k < 80; ++k) {
     EXPECT_NEAR(made.x.position_mm[k], even.position_mm[k], 1e-12);
     EXPECT_NEAR(made.y.position_mm[k], even.position_mm[k], 1e-12);

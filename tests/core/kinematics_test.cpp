@@ -15,7 +15,7 @@ TEST(MotorsOf, ACoreXyDoSumAndDifference) {
   EXPECT_DOUBLE_EQ(motors.of(0, 3.0, 4.0, 5.0), 7.0);
   EXPECT_DOUBLE_EQ(motors.of(1, 3.0, 4.0, 5.0), -1.0);
   EXPECT_DOUBLE_EQ(motors.of(2, 3.0, 4.0, 5.0), 5.0);
-  EXPECT_DOUBLE_EQ(motors.largest_of_xy(3.0, -4.0, 50.0), 7.0);
+  EXPECT_DOUBLE_EQ(motors.largest_of_xy({3.0, -4.0}, 50.0), 7.0);
   EXPECT_DOUBLE_EQ(motors.uncertainty(1), 2.0);
   EXPECT_FALSE(motors.moves_xy(2));
 }
@@ -25,7 +25,7 @@ TEST(MotorsOf, ACoreXzLiftThreeTimesAsFarOnRepRapFirmware) {
   EXPECT_FALSE(klipper.shared_by_xy());
   EXPECT_DOUBLE_EQ(klipper.of(0, 3.0, 4.0, 5.0), 8.0);
   EXPECT_DOUBLE_EQ(klipper.of(2, 3.0, 4.0, 5.0), -2.0);
-  EXPECT_DOUBLE_EQ(klipper.largest_of_xy(3.0, 4.0, 5.0), 8.0);
+  EXPECT_DOUBLE_EQ(klipper.largest_of_xy({3.0, 4.0}, 5.0), 8.0);
   const Motors rrf(Kinematics::corexz, Firmware::rrf);
   EXPECT_DOUBLE_EQ(rrf.of(0, 3.0, 4.0, 5.0), 18.0);
   EXPECT_DOUBLE_EQ(rrf.of(2, 3.0, 4.0, 5.0), -12.0);

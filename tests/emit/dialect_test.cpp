@@ -138,22 +138,22 @@ TEST(LimitsInRun, LeaveZAndRetractionAsTheFileHasThem) {
 
 TEST(ShaperLines, SwitchOffAndBackOn) {
   gcode::Shaper on;
-  on.freq_x_hz = 40.0;
-  on.freq_y_hz = 42.5;
+  on.freq_hz.x = 40.0;
+  on.freq_hz.y = 42.5;
   EXPECT_THAT(shaper_lines(Firmware::klipper, {}, on),
               ElementsAre("SET_INPUT_SHAPER SHAPER_FREQ_X=0 SHAPER_FREQ_Y=0"));
   EXPECT_THAT(shaper_lines(Firmware::marlin, {}, on), ElementsAre("M593 X F0", "M593 Y F0"));
   EXPECT_THAT(shaper_lines(Firmware::marlin, on, {}), ElementsAre("M593 X F40", "M593 Y F42.5"));
   EXPECT_THAT(shaper_lines(Firmware::rrf, {}, on), ElementsAre("M593 P\"none\""));
-  on.settings.type_x = "mzv";
-  on.settings.damping_ratio_x = 0.1;
+  on.settings.type.x = "mzv";
+  on.settings.damping_ratio.x = 0.1;
   EXPECT_THAT(shaper_lines(Firmware::rrf, on, {}), ElementsAre("M593 P\"mzv\" F40 S0.1"));
   EXPECT_THAT(shaper_lines(Firmware::rrf, on, on), IsEmpty());
 }
 
 TEST(ShaperLines, SwitchOffWhatIsNotKnownAndCannotSwitchItOn) {
   gcode::Shaper unknown;
-  unknown.unknown_x = unknown.unknown_y = true;
+  unknown.unknown.x = unknown.unknown.y = true;
   EXPECT_THAT(shaper_lines(Firmware::klipper, {}, unknown),
               ElementsAre("SET_INPUT_SHAPER SHAPER_FREQ_X=0 SHAPER_FREQ_Y=0"));
   EXPECT_THAT(shaper_lines(Firmware::klipper, unknown, {}), IsEmpty());
@@ -166,8 +166,8 @@ TEST(ShaperLines, SwitchOffWhatIsNotKnownAndCannotSwitchItOn) {
   EXPECT_THAT(shaper_lines(Firmware::rrf, {}, unknown), ElementsAre("M593 P\"none\""));
   EXPECT_THAT(shaper_lines(Firmware::rrf, unknown, {}), IsEmpty());
   EXPECT_EQ(unknown_shaper_lines(Firmware::klipper, unknown, unknown), "");
-  unknown.unknown_y = false;
-  unknown.freq_y_hz = 40.0;
+  unknown.unknown.y = false;
+  unknown.freq_hz.y = 40.0;
   EXPECT_THAT(shaper_lines(Firmware::klipper, unknown, {}),
               ElementsAre("SET_INPUT_SHAPER SHAPER_FREQ_Y=40"));
   EXPECT_EQ(unknown_shaper_lines(Firmware::klipper, unknown, {}),

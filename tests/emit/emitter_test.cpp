@@ -307,12 +307,12 @@ TEST(Emitter, LeavesTheShaperOffOverPausesAndRetractions) {
 // A macro may set the shaper of either axis, so it is switched off for both.
 TEST(Emitter, GivesBackNoShaperToTheAxisThatHasNone) {
   EmitOptions how = options();
-  how.interpreter.shaper_freq_x_hz = 0.0;
-  how.interpreter.shaper_freq_y_hz = 37.5;
+  how.interpreter.shaper_freq_hz.x = 0.0;
+  how.interpreter.shaper_freq_hz.y = 37.5;
   const std::string input = kHead + "G1 X10 E1\nG4 P1\n";
   EXPECT_THAT(emit(input, how).text, HasSubstr("\n" + kShaperOff));
   EXPECT_THAT(emit(input, how).text, HasSubstr("\nSET_INPUT_SHAPER SHAPER_FREQ_Y=37.5\n"));
-  how.interpreter.shaper_freq_y_hz = 0.0;
+  how.interpreter.shaper_freq_hz.y = 0.0;
   EXPECT_THAT(emit(input, how).text, Not(HasSubstr("SET_INPUT_SHAPER")));
 }
 
@@ -322,8 +322,8 @@ const std::string kStaysOff =
 
 TEST(Emitter, SaysWhichShaperItCannotGiveBack) {
   EmitOptions how = options();
-  how.interpreter.shaper_freq_x_hz = how.interpreter.shaper_freq_y_hz = 0.0;
-  how.interpreter.shaper_unknown_x = how.interpreter.shaper_unknown_y = true;
+  how.interpreter.shaper_freq_hz.x = how.interpreter.shaper_freq_hz.y = 0.0;
+  how.interpreter.shaper_unknown.x = how.interpreter.shaper_unknown.y = true;
   const std::string input = kHead + "G1 X10 E1\nG4 P1\n";
   const std::string text = emit(input, how).text;
   EXPECT_THAT(text, HasSubstr("\n" + kShaperOff));
@@ -340,8 +340,8 @@ TEST(Emitter, SaysWhichShaperItCannotGiveBack) {
 // What follows a line may have switched the shaper on, as tool changers' macros do.
 TEST(Emitter, SwitchesAnUnknownShaperOffAgainBehindAllThatMayHaveSetIt) {
   EmitOptions how = options();
-  how.interpreter.shaper_freq_x_hz = how.interpreter.shaper_freq_y_hz = 0.0;
-  how.interpreter.shaper_unknown_x = how.interpreter.shaper_unknown_y = true;
+  how.interpreter.shaper_freq_hz.x = how.interpreter.shaper_freq_hz.y = 0.0;
+  how.interpreter.shaper_unknown.x = how.interpreter.shaper_unknown.y = true;
   for (const std::string line : {"T1\n", "PARK_HEAD\n", "M600\n"}) {
     EXPECT_THAT(from_first_run(kHead + "G1 X10 E1\n" + line + kHead +
                                    "G1 X20 E1\n"
@@ -371,19 +371,19 @@ TEST(Emitter, SwitchesTheShapersOfOtherFirmwaresOffThatNobodyHasNamed) {
   const std::string runs =
       "G28\n" + kHead + "G1 X10 E1\nG4 P1\nG1 X20 E1\nT1\n" + kHead + "G1 X30 E1\nG1 X40 E1\n";
   EmitOptions how = options_of(Firmware::marlin);
-  how.interpreter.shaper_unknown_x = how.interpreter.shaper_unknown_y = true;
+  how.interpreter.shaper_unknown.x = how.interpreter.shaper_unknown.y = true;
   const std::string marlin = emit(runs, how).text;
   EXPECT_EQ(count_of("M593 X F0\n", marlin), 2U) << marlin;
   EXPECT_EQ(count_of("M593 Y F0\n", marlin), 2U);
   EXPECT_THAT(marlin, ::testing::EndsWith(kStaysOff + "M593 X F... and M593 Y F...\n"));
   // A Marlin that was built without input shaping knows no M593.
-  how.interpreter.shaper_unknown_x = how.interpreter.shaper_unknown_y = false;
+  how.interpreter.shaper_unknown.x = how.interpreter.shaper_unknown.y = false;
   EXPECT_THAT(emit(runs, how).text, Not(HasSubstr("M593")));
 
   // On RepRapFirmware a tool's macros may switch it on, whatever config.g says.
   how = options_of(Firmware::rrf);
   EXPECT_EQ(count_of("M593 P\"none\"\n", emit(runs, how).text), 2U);
-  how.interpreter.shaper_unknown_x = how.interpreter.shaper_unknown_y = true;
+  how.interpreter.shaper_unknown.x = how.interpreter.shaper_unknown.y = true;
   EXPECT_THAT(emit(runs, how).text, ::testing::EndsWith(kStaysOff + "M593 P\"...\" F...\n"));
 }
 

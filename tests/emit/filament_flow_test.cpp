@@ -21,7 +21,7 @@ std::vector<Stroke> lines(const std::vector<double>& lengths_mm, const std::vect
   std::vector<Stroke> result;
   Stroke line;
   for (std::size_t i = 0; i < lengths_mm.size(); ++i) {
-    line.x_mm += lengths_mm[i];
+    line.place_mm.x += lengths_mm[i];
     line.e_mm += flows[i] * lengths_mm[i];
     line.end_s += lengths_mm[i] / speed_mm_s;
     result.push_back(line);
@@ -33,7 +33,7 @@ std::vector<double> flows_of(const std::vector<Stroke>& strokes) {
   std::vector<double> result;
   Stroke before;
   for (const Stroke& stroke : strokes) {
-    result.push_back((stroke.e_mm - before.e_mm) / (stroke.x_mm - before.x_mm));
+    result.push_back((stroke.e_mm - before.e_mm) / (stroke.place_mm.x - before.place_mm.x));
     before = stroke;
   }
   return result;
@@ -132,7 +132,7 @@ struct Nozzle {
     Run run;
     run.moves = &moves;
     run.base = &base;
-    return {run, starts_s, axis, axis};
+    return {run, starts_s, on_all_axes(axis)};
   }
 
   // Filament of the sliced path at time t of the plan.

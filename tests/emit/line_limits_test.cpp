@@ -21,7 +21,8 @@ using testing::random_path;
 
 std::array<double, 2> velocity_mm_s(const Stroke& from, const Stroke& to) {
   const double duration_s = to.end_s - from.end_s;
-  return {(to.x_mm - from.x_mm) / duration_s, (to.y_mm - from.y_mm) / duration_s};
+  return {(to.place_mm.x - from.place_mm.x) / duration_s,
+          (to.place_mm.y - from.place_mm.y) / duration_s};
 }
 
 TEST(Strokes, CarryTheHeightOfASpiral) {
@@ -71,7 +72,7 @@ TEST(Strokes, ClimbWhereThatCostsNoTime) {
     } else {
       ++level;
     }
-    EXPECT_NEAR(to.z_mm, 0.2 + 0.004 * (to.x_mm - 100.0) / 0.5, 0.02);
+    EXPECT_NEAR(to.z_mm, 0.2 + 0.004 * (to.place_mm.x - 100.0) / 0.5, 0.02);
     before = v;
     from = to;
   }

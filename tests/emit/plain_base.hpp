@@ -102,8 +102,8 @@ inline dynamics::BaseTrajectory bang_bang(unsigned seed, double accel_mm_s2, std
 inline EmitOptions options() {
   EmitOptions options;
   options.run_limits = {1200.0, 1e6, 1000.0, 0.0, 1e6};
-  options.interpreter.shaper_freq_x_hz = 45.0;
-  options.interpreter.shaper_freq_y_hz = 45.0;
+  options.interpreter.shaper_freq_hz.x = 45.0;
+  options.interpreter.shaper_freq_hz.y = 45.0;
   options.version = "test";
   return options;
 }

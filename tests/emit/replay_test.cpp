@@ -140,8 +140,8 @@ TEST(Replay, KeepsTheClockUnderASpeedFactor) {
 TEST(Replay, EndsEveryLineWhereItIsMeant) {
   const Replay replay(drawing(5, 20.0), options());
   for (std::size_t i = 0; i < replay.meant.size(); ++i) {
-    ASSERT_NEAR(replay.moves[i].segment.end_mm[X], replay.meant[i].x_mm, 1e-9);
-    ASSERT_NEAR(replay.moves[i].segment.end_mm[Y], replay.meant[i].y_mm, 1e-9);
+    ASSERT_NEAR(replay.moves[i].segment.end_mm[X], replay.meant[i].place_mm.x, 1e-9);
+    ASSERT_NEAR(replay.moves[i].segment.end_mm[Y], replay.meant[i].place_mm.y, 1e-9);
   }
 }
 

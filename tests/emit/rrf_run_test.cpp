@@ -158,7 +158,7 @@ TEST(RrfRun, GivesEachLineAboutTheTimeItIsToTake) {
       t += duration_s;
       Stroke stroke;
       stroke.end_s = t;
-      stroke.x_mm = x_mm;
+      stroke.place_mm.x = x_mm;
       strokes.push_back(stroke);
       wanted_mm_s.push_back(speed_mm_s);
     };

@@ -46,27 +46,29 @@ ErrorWeight all_alike(double) { return {}; }
 // between the polygon's vertices. `look` gets the time and both axes.
 void follow(const Polygon& polygon, const LineRules& rules, double until_s,
             const std::function<void(double, NozzleState, NozzleState)>& look) {
-  NozzleState x{polygon.x_mm.front(), 0.0};
-  NozzleState y{polygon.y_mm.front(), 0.0};
+  NozzleState x{polygon.places_mm.x.front(), 0.0};
+  NozzleState y{polygon.places_mm.y.front(), 0.0};
   const auto hold = [&](double from, double to, std::array<double, 2> at,
                         std::array<double, 2> speed) {
     const int steps = std::max(static_cast<int>(std::ceil((to - from) / 1e-4)), 1);
     const double h = (to - from) / steps;
     for (int i = 0; i < steps; ++i) {
       const double t = h * i;
-      x = dynamics::exact_step(rules.nozzle_x, x, {at[0] + speed[0] * t, speed[0], 0.0}, h);
-      y = dynamics::exact_step(rules.nozzle_y, y, {at[1] + speed[1] * t, speed[1], 0.0}, h);
+      x = dynamics::exact_step(rules.nozzle.x, x, {at[0] + speed[0] * t, speed[0], 0.0}, h);
+      y = dynamics::exact_step(rules.nozzle.y, y, {at[1] + speed[1] * t, speed[1], 0.0}, h);
       look(from + t + h, x, y);
     }
   };
   for (std::size_t i = 1; i < polygon.times_s.size(); ++i) {
     const double duration = polygon.times_s[i] - polygon.times_s[i - 1];
-    hold(polygon.times_s[i - 1], polygon.times_s[i], {polygon.x_mm[i - 1], polygon.y_mm[i - 1]},
-         {(polygon.x_mm[i] - polygon.x_mm[i - 1]) / duration,
-          (polygon.y_mm[i] - polygon.y_mm[i - 1]) / duration});
+    hold(polygon.times_s[i - 1], polygon.times_s[i],
+         {polygon.places_mm.x[i - 1], polygon.places_mm.y[i - 1]},
+         {(polygon.places_mm.x[i] - polygon.places_mm.x[i - 1]) / duration,
+          (polygon.places_mm.y[i] - polygon.places_mm.y[i - 1]) / duration});
   }
   if (until_s > polygon.times_s.back() + 1e-9) {
-    hold(polygon.times_s.back(), until_s, {polygon.x_mm.back(), polygon.y_mm.back()}, {0.0, 0.0});
+    hold(polygon.times_s.back(), until_s, {polygon.places_mm.x.back(), polygon.places_mm.y.back()},
+         {0.0, 0.0});
   }
 }
 
@@ -74,8 +76,8 @@ void follow(const Polygon& polygon, const LineRules& rules, double until_s,
 // itself.
 double error_um(const Polygon& polygon, const BaseTrajectory& base, const LineRules& rules,
                 std::array<double, 2> normal) {
-  const Followed fx(base, &BaseTrajectory::x, rules.nozzle_x);
-  const Followed fy(base, &BaseTrajectory::y, rules.nozzle_y);
+  const Followed fx(base, 0, rules.nozzle.x);
+  const Followed fy(base, 1, rules.nozzle.y);
   double sum = 0.0;
   int count = 0;
   follow(polygon, rules, base.duration_s(), [&](double t, NozzleState x, NozzleState y) {
@@ -100,12 +102,12 @@ const AxisGrid kSteps{0.0, 0.0125};
 TEST(LineCosts, AgreeWithTheNozzleStepByStep) {
   const BaseTrajectory base = wavy_base();
   LineRules rules;
-  rules.nozzle_y = dynamics::from_frequency(37.0, 0.1);
+  rules.nozzle.y = dynamics::from_frequency(37.0, 0.1);
   const ErrorWeight weight{0.9, 0.2, 0.3};
   const LineCosts<1> costs(
       base, [&](double t) { return t < 0.06 ? weight : ErrorWeight{}; }, rules);
-  const Followed fx(base, &BaseTrajectory::x, rules.nozzle_x);
-  const Followed fy(base, &BaseTrajectory::y, rules.nozzle_y);
+  const Followed fx(base, 0, rules.nozzle.x);
+  const Followed fy(base, 1, rules.nozzle.y);
   std::mt19937 random(7);
   std::normal_distribution<double> normal(0.0, 0.02);
   for (const std::size_t k : {0U, 50U, 115U}) {  // the last line sees two weights
@@ -125,8 +127,8 @@ TEST(LineCosts, AgreeWithTheNozzleStepByStep) {
     for (std::size_t j = 1; j <= m; ++j) {
       const double h = costs.dt_s();
       const Eigen::Vector2d at = start + speed * (static_cast<double>(j - 1) * h);
-      x = dynamics::exact_step(rules.nozzle_x, x, {at[0], speed[0], 0.0}, h);
-      y = dynamics::exact_step(rules.nozzle_y, y, {at[1], speed[1], 0.0}, h);
+      x = dynamics::exact_step(rules.nozzle.x, x, {at[0], speed[0], 0.0}, h);
+      y = dynamics::exact_step(rules.nozzle.y, y, {at[1], speed[1], 0.0}, h);
       const double t = costs.time_s(k + j);
       const double ex = x.position() - fx.at(t).position();
       const double ey = y.position() - fy.at(t).position();
@@ -158,13 +160,13 @@ TEST(LineCosts, AgreeWithANozzleOfSeveralModes) {
   const std::array along_y = {Mode{285.3, 0.071, 0.36}, Mode{365.1, 0.085, 0.37},
                               Mode{206.1, 0.152, 0.27}};
   LineRules rules;
-  rules.nozzle_x = dynamics::FlexibleAxis(along_x);
-  rules.nozzle_y = dynamics::FlexibleAxis(along_y);
+  rules.nozzle.x = dynamics::FlexibleAxis(along_x);
+  rules.nozzle.y = dynamics::FlexibleAxis(along_y);
   const ErrorWeight weight{0.9, 0.2, 0.3};
   const LineCosts<kThree> costs(
       base, [&](double) { return weight; }, rules);
-  const Followed fx(base, &BaseTrajectory::x, rules.nozzle_x);
-  const Followed fy(base, &BaseTrajectory::y, rules.nozzle_y);
+  const Followed fx(base, 0, rules.nozzle.x);
+  const Followed fy(base, 1, rules.nozzle.y);
   std::mt19937 random(7);
   std::normal_distribution<double> normal(0.0, 0.02);
   const auto swing = [&](const dynamics::FlexibleAxis& axis) {
@@ -177,8 +179,8 @@ TEST(LineCosts, AgreeWithANozzleOfSeveralModes) {
   LineFan<kThree> fan(costs);
   for (const std::size_t k : {0U, 50U, 115U}) {
     const std::size_t m = 10;
-    const NozzleState swing_x = swing(rules.nozzle_x);
-    const NozzleState swing_y = swing(rules.nozzle_y);
+    const NozzleState swing_x = swing(rules.nozzle.x);
+    const NozzleState swing_y = swing(rules.nozzle.y);
     WVector<kThree> w;
     w << vector_of<kThree>(swing_x), normal(random), vector_of<kThree>(swing_y), normal(random),
         normal(random), normal(random);
@@ -196,8 +198,8 @@ TEST(LineCosts, AgreeWithANozzleOfSeveralModes) {
     const double h = costs.dt_s();
     for (std::size_t j = 1; j <= m; ++j) {
       const Eigen::Vector2d at = start + speed * (static_cast<double>(j - 1) * h);
-      x = dynamics::exact_step(rules.nozzle_x, x, {at[0], speed[0], 0.0}, h);
-      y = dynamics::exact_step(rules.nozzle_y, y, {at[1], speed[1], 0.0}, h);
+      x = dynamics::exact_step(rules.nozzle.x, x, {at[0], speed[0], 0.0}, h);
+      y = dynamics::exact_step(rules.nozzle.y, y, {at[1], speed[1], 0.0}, h);
       const double t = costs.time_s(k + j);
       const double ex = x.position() - fx.at(t).position();
       const double ey = y.position() - fy.at(t).position();
@@ -243,7 +245,7 @@ TEST(LineCosts, RingDownIsTheIntegralOfTheSquareOfSeveralModes) {
 TEST(LineFan, AgreesWithLineCostsAndBestEnd) {
   const BaseTrajectory base = wavy_base();
   LineRules rules;
-  rules.nozzle_y = dynamics::from_frequency(37.0, 0.1);
+  rules.nozzle.y = dynamics::from_frequency(37.0, 0.1);
   const LineCosts<1> costs(
       base,
       [](double t) {
@@ -334,7 +336,7 @@ TEST(LineCosts, RingDownIsTheIntegralOfTheSquare) {
   double sum = 0.0;
   constexpr double kStep = 1e-5;
   for (int i = 0; i < 200000; ++i) {
-    const NozzleState next = dynamics::exact_step(rules.nozzle_x, x, {}, kStep);
+    const NozzleState next = dynamics::exact_step(rules.nozzle.x, x, {}, kStep);
     sum += 0.25 * kStep * (x.position() * x.position() + next.position() * next.position());
     x = next;
   }
@@ -405,7 +407,7 @@ TEST(LineCosts, AreTheMeanOfTwoNozzlesWhereFrequenciesMayBeOff) {
   const BaseTrajectory base = wavy_base();
   const std::array along_y = {Mode{285.3, 0.071, 0.7}, Mode{365.1, 0.085, 0.3}};
   LineRules rules;
-  rules.nozzle_y = dynamics::FlexibleAxis(along_y);
+  rules.nozzle.y = dynamics::FlexibleAxis(along_y);
   const ErrorWeight weight{0.9, 0.2, 0.3};
   const auto at_all_times = [&](double) { return weight; };
   LineRules robust = rules;
@@ -427,8 +429,8 @@ TEST(LineCosts, AreTheMeanOfTwoNozzlesWhereFrequenciesMayBeOff) {
   for (Eigen::Index nozzle = 0; nozzle < 2; ++nozzle) {
     LineRules alone = rules;
     const double factor = nozzle == 0 ? 1.0 - 0.07 : 1.0 + 0.07;
-    alone.nozzle_x = rules.nozzle_x.detuned(factor);
-    alone.nozzle_y = rules.nozzle_y.detuned(factor);
+    alone.nozzle.x = rules.nozzle.x.detuned(factor);
+    alone.nozzle.y = rules.nozzle.y.detuned(factor);
     const LineCosts<2> one(base, at_all_times, alone);
     WVector<2> v;
     v << w.segment<4>(4 * nozzle), w[8], w.segment<4>(9 + 4 * nozzle), w[17], w[18], w[19];
@@ -483,16 +485,16 @@ struct Circle {
   [[nodiscard]] double square_of_error(const LineRules& rules, double factor) const {
     const BaseTrajectory base = testing::sampled(*this, kUntil_s + 0.3);
     RunEnds ends;
-    ends.end_x_mm = (*this)(kUntil_s)[0];
-    ends.end_y_mm = (*this)(kUntil_s)[1];
+    ends.end_mm.x = (*this)(kUntil_s)[0];
+    ends.end_mm.y = (*this)(kUntil_s)[1];
     ends.until_s = kUntil_s;
-    const Polygon polygon = step_path(base, {}, weight, ends, kSteps, kSteps, rules);
+    const Polygon polygon = step_path(base, {}, weight, ends, on_all_axes(kSteps), rules);
     EXPECT_GE(polygon.times_s.size(), 2U) << radius_mm;
     LineRules real = rules;
-    real.nozzle_x = rules.nozzle_x.detuned(factor);
-    real.nozzle_y = rules.nozzle_y.detuned(factor);
-    const Followed fx(base, &BaseTrajectory::x, real.nozzle_x);
-    const Followed fy(base, &BaseTrajectory::y, real.nozzle_y);
+    real.nozzle.x = rules.nozzle.x.detuned(factor);
+    real.nozzle.y = rules.nozzle.y.detuned(factor);
+    const Followed fx(base, 0, real.nozzle.x);
+    const Followed fy(base, 1, real.nozzle.y);
     double sum = 0.0;
     double before_s = 0.0;
     follow(polygon, real, kUntil_s, [&](double t, NozzleState x, NozzleState y) {
@@ -529,16 +531,16 @@ TEST(StepPath, KeepsAllRulesOnRandomWays) {
   for (unsigned seed = 0; seed < 40; ++seed) {
     const RandomWay way(seed);
     const BaseTrajectory base = testing::sampled(way.path, std::ceil(way.duration_s * 1e3) * 1e-3);
-    const Polygon polygon = step_path(base, {}, all_alike, way.ends, kSteps, kSteps, rules);
+    const Polygon polygon = step_path(base, {}, all_alike, way.ends, on_all_axes(kSteps), rules);
     ASSERT_GE(polygon.times_s.size(), 2U) << seed;
     EXPECT_DOUBLE_EQ(polygon.times_s.front(), 0.0);
     EXPECT_LE(polygon.times_s.back(), base.duration_s() + 1e-9);
-    EXPECT_NEAR(polygon.x_mm.front(), 0.0, 1e-12);
-    EXPECT_NEAR(polygon.x_mm.back(), way.ends.end_x_mm, 1e-12);
-    EXPECT_NEAR(polygon.y_mm.back(), way.ends.end_y_mm, 1e-12);
+    EXPECT_NEAR(polygon.places_mm.x.front(), 0.0, 1e-12);
+    EXPECT_NEAR(polygon.places_mm.x.back(), way.ends.end_mm.x, 1e-12);
+    EXPECT_NEAR(polygon.places_mm.y.back(), way.ends.end_mm.y, 1e-12);
     for (std::size_t i = 1; i < polygon.times_s.size(); ++i) {
-      const double dx = (polygon.x_mm[i] - polygon.x_mm[i - 1]) / 0.0125;
-      const double dy = (polygon.y_mm[i] - polygon.y_mm[i - 1]) / 0.0125;
+      const double dx = (polygon.places_mm.x[i] - polygon.places_mm.x[i - 1]) / 0.0125;
+      const double dy = (polygon.places_mm.y[i] - polygon.places_mm.y[i - 1]) / 0.0125;
       EXPECT_NEAR(dx, std::round(dx), 1e-6);
       EXPECT_NEAR(dy, std::round(dy), 1e-6);
       EXPECT_GE(std::max(std::abs(dx), std::abs(dy)), 6.0 - 1e-6);
@@ -558,7 +560,7 @@ TEST(StepPath, IsNoFurtherOffThanStepsAre) {
   for (unsigned seed = 0; seed < 10; ++seed) {
     const RandomWay way(seed);
     const BaseTrajectory base = testing::sampled(way.path, std::ceil(way.duration_s * 1e3) * 1e-3);
-    const Polygon polygon = step_path(base, {}, all_alike, way.ends, kSteps, kSteps, rules);
+    const Polygon polygon = step_path(base, {}, all_alike, way.ends, on_all_axes(kSteps), rules);
     // Rounding to the nearest step gives an error of 3.6 µm RMS on each axis. The nozzle's error is
     // larger, because the rounding makes it ring.
     EXPECT_LE(error_um(polygon, base, rules, {1.0, 0.0}), 4.5) << seed;
@@ -581,7 +583,7 @@ TEST(StepPath, DrawsASlantedLineToAFractionOfAStep) {
                        kAlong + normal[1] * normal[1]};
   };
   const Polygon polygon =
-      step_path(base, {}, across, {0.0, 0.0, 17.3, 5.1}, kSteps, kSteps, marlin_rules());
+      step_path(base, {}, across, {0.0, 0.0, 17.3, 5.1}, on_all_axes(kSteps), marlin_rules());
   ASSERT_FALSE(polygon.times_s.empty());
   EXPECT_LE(error_um(polygon, base, marlin_rules(), normal), 0.6);
 }
@@ -597,7 +599,7 @@ TEST(StepPath, CountsTheLinesBeforeTheRun) {
     ends.lines_before_s.push_back(-1e-4 * i);
   }
   const LineRules rules = marlin_rules();
-  const Polygon polygon = step_path(base, {}, all_alike, ends, kSteps, kSteps, rules);
+  const Polygon polygon = step_path(base, {}, all_alike, ends, on_all_axes(kSteps), rules);
   ASSERT_GE(polygon.times_s.size(), 2U);
   // There were 18 lines in the last 2 ms, so the next line must take as long as a line may.
   EXPECT_GE(polygon.times_s[1], 0.5 * rules.max_line_s);
@@ -610,8 +612,8 @@ TEST(StepPath, LinesAcrossAWantedTimeAreShort) {
       },
       0.5);
   const std::vector<double> wanted = {0.2, 0.25, 0.3};
-  const Polygon polygon =
-      step_path(base, wanted, all_alike, {0.0, 0.0, 40.0, 0.0}, kSteps, kSteps, marlin_rules());
+  const Polygon polygon = step_path(base, wanted, all_alike, {0.0, 0.0, 40.0, 0.0},
+                                    on_all_axes(kSteps), marlin_rules());
   for (std::size_t i = 1; i < polygon.times_s.size(); ++i) {
     for (const double t : wanted) {
       if (polygon.times_s[i - 1] < t - 3e-4 && polygon.times_s[i] > t + 3e-4) {
@@ -627,8 +629,9 @@ TEST(StepPath, IsEmptyWhereNoLineIsLongEnough) {
         return std::array{0.03 * rise(t, 0.003), 0.0};
       },
       0.003);
-  EXPECT_TRUE(step_path(base, {}, all_alike, {0.0, 0.0, 0.025, 0.0}, kSteps, kSteps, marlin_rules())
-                  .times_s.empty());
+  EXPECT_TRUE(
+      step_path(base, {}, all_alike, {0.0, 0.0, 0.025, 0.0}, on_all_axes(kSteps), marlin_rules())
+          .times_s.empty());
 }
 
 TEST(StepPath, IsTheSameWayAcrossBlocks) {
@@ -640,7 +643,7 @@ TEST(StepPath, IsTheSameWayAcrossBlocks) {
       6.0);
   const double x = 0.0125 * std::round(20.0 * std::sin(4.8) / 0.0125);
   const Polygon polygon =
-      step_path(base, {}, all_alike, {0.0, 0.0, x, 15.0}, kSteps, kSteps, marlin_rules());
+      step_path(base, {}, all_alike, {0.0, 0.0, x, 15.0}, on_all_axes(kSteps), marlin_rules());
   ASSERT_FALSE(polygon.times_s.empty());
   for (std::size_t i = 18; i < polygon.times_s.size(); ++i) {
     EXPECT_GE(polygon.times_s[i] - polygon.times_s[i - 18], 0.1 - 1e-9);
@@ -696,7 +699,7 @@ TEST(StepPath, CoversALongCruiseByOneLine) {
                        kAlong + normal[1] * normal[1]};
   };
   const Polygon polygon =
-      step_path(base, {}, across, way.ends(base), kSteps, kSteps, marlin_rules());
+      step_path(base, {}, across, way.ends(base), on_all_axes(kSteps), marlin_rules());
   ASSERT_FALSE(polygon.times_s.empty());
   EXPECT_GT(longest_line_s(polygon), 3.0);
   EXPECT_LT(polygon.times_s.size(), 60U);
@@ -707,7 +710,7 @@ TEST(StepPath, DoesNotPassAWantedTimeOnItsWay) {
   const LongWay way(30.0, 11.0, 5.0);
   const BaseTrajectory base = way.base();
   const Polygon polygon =
-      step_path(base, {2.5}, all_alike, way.ends(base), kSteps, kSteps, marlin_rules());
+      step_path(base, {2.5}, all_alike, way.ends(base), on_all_axes(kSteps), marlin_rules());
   ASSERT_FALSE(polygon.times_s.empty());
   EXPECT_GT(longest_line_s(polygon), 1.5);
   for (std::size_t i = 1; i < polygon.times_s.size(); ++i) {
@@ -722,7 +725,8 @@ TEST(StepPath, GoesSlowly) {
   const LongWay way(0.5, 0.0, 20.0);
   const BaseTrajectory base = way.base();
   LineRules rules = marlin_rules();
-  const Polygon polygon = step_path(base, {}, all_alike, way.ends(base), kSteps, kSteps, rules);
+  const Polygon polygon =
+      step_path(base, {}, all_alike, way.ends(base), on_all_axes(kSteps), rules);
   ASSERT_FALSE(polygon.times_s.empty());
   EXPECT_GT(longest_line_s(polygon), 15.0);
   EXPECT_LE(error_um(polygon, base, rules, {0.0, 1.0}), 7.0);

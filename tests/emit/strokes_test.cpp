@@ -37,8 +37,8 @@ TEST(Strokes, EndExactlyWhereAndWithWhatTheMovesEnd) {
     const std::vector<Stroke> drawn = path.draw(testing::plan_as_base(path.moves));
     ASSERT_FALSE(drawn.empty());
     const gcode::Position& end = path.moves.back().segment.end_mm;
-    EXPECT_EQ(drawn.back().x_mm, end[X]);
-    EXPECT_EQ(drawn.back().y_mm, end[Y]);
+    EXPECT_EQ(drawn.back().place_mm.x, end[X]);
+    EXPECT_EQ(drawn.back().place_mm.y, end[Y]);
     EXPECT_EQ(drawn.back().z_mm, end[Z]);
     EXPECT_EQ(drawn.back().e_mm, end[E] - path.moves.front().segment.start_mm[E]);
     EXPECT_LE(drawn.back().events, path.events.size());
@@ -60,14 +60,14 @@ TEST(Strokes, LayWhatTheFileHasThoughTheFirmwareIsBehindIt) {
       }
       path.moves.front().segment.start_mm[E] -= behind_mm;
       for (const Stroke& stroke : path.draw(testing::plan_as_base(path.moves))) {
-        const double share = (stroke.x_mm - 100.0) / 10.0;
+        const double share = (stroke.place_mm.x - 100.0) / 10.0;
         // The lines pass the corner at a small distance.
-        if (share < 1.0 && stroke.y_mm < 100.01) {
+        if (share < 1.0 && stroke.place_mm.y < 100.01) {
           EXPECT_NEAR(stroke.e_mm, share * first_mm, std::abs(behind_mm) + kAlong_mm);
           EXPECT_GE(stroke.e_mm, std::min(0.0, first_mm));
           EXPECT_LE(stroke.e_mm, std::max(0.0, first_mm));
         } else {
-          EXPECT_NEAR(stroke.e_mm, first_mm + (stroke.y_mm - 100.0) / 10.0, kAlong_mm);
+          EXPECT_NEAR(stroke.e_mm, first_mm + (stroke.place_mm.y - 100.0) / 10.0, kAlong_mm);
         }
       }
     }
@@ -76,14 +76,14 @@ TEST(Strokes, LayWhatTheFileHasThoughTheFirmwareIsBehindIt) {
 
 // A line that returns to its start.
 TEST(GiveLength, GoesAlongTheAxisThatTurnsAndStaysWithinItsTravel) {
-  const Grid grid{{0.0, 1e-4}, {0.0, 2e-4}, {0.0, 1e-4}};
+  const Grid grid{{{0.0, 1e-4}, {0.0, 2e-4}}, {0.0, 1e-4}};
   LineRules rules;
-  rules.reach_x = {0.0, 250.0};
-  rules.reach_y = {-1.0, 210.0};
+  rules.reach.x = {0.0, 250.0};
+  rules.reach.y = {-1.0, 210.0};
   const auto end_of = [&](double x_mm, double y_mm, double next_x_mm, double next_y_mm) {
     Stroke stroke{0.0, x_mm, y_mm};
     give_length({1.0, next_x_mm, next_y_mm}, grid, rules, stroke);
-    return std::array{stroke.x_mm, stroke.y_mm};
+    return std::array{stroke.place_mm.x, stroke.place_mm.y};
   };
   const auto expect_end = [](std::array<double, 2> end_mm, double x_mm, double y_mm) {
     EXPECT_NEAR(end_mm[0], x_mm, 1e-9);
@@ -142,8 +142,8 @@ TEST(Strokes, LieOnTheGridAndTakeNoLessThanTheShortestTime) {
     for (const Stroke& stroke : path.draw(testing::plan_as_base(path.moves), how)) {
       EXPECT_GE(stroke.end_s - last, shortest - 1e-9);
       EXPECT_LE(stroke.end_s - last, how.lines.max_line_s + 2.0 * shortest);
-      EXPECT_NEAR(stroke.x_mm * 1e4, std::round(stroke.x_mm * 1e4), 1e-5);
-      EXPECT_NEAR(stroke.y_mm * 1e4, std::round(stroke.y_mm * 1e4), 1e-5);
+      EXPECT_NEAR(stroke.place_mm.x * 1e4, std::round(stroke.place_mm.x * 1e4), 1e-5);
+      EXPECT_NEAR(stroke.place_mm.y * 1e4, std::round(stroke.place_mm.y * 1e4), 1e-5);
       last = stroke.end_s;
     }
   }
@@ -156,7 +156,7 @@ TEST(Strokes, LieOnAGridThatBeginsAtTheZeroOfTheFile) {
   const std::vector<Stroke> drawn =
       strokes(run, {{0.00003, 1e-4}, {-1.00007, 1e-4}, {}}, options());
   for (std::size_t i = 0; i + 1 < drawn.size(); ++i) {
-    const double steps = (drawn[i].x_mm - 0.00003) * 1e4;
+    const double steps = (drawn[i].place_mm.x - 0.00003) * 1e4;
     EXPECT_NEAR(steps, std::round(steps), 1e-5);
   }
 }
@@ -167,11 +167,12 @@ std::array<double, 2> at(const std::vector<Stroke>& drawn, const gcode::Position
   for (const Stroke& to : drawn) {
     if (t <= to.end_s) {
       const double s = (t - from.end_s) / (to.end_s - from.end_s);
-      return {from.x_mm + s * (to.x_mm - from.x_mm), from.y_mm + s * (to.y_mm - from.y_mm)};
+      return {from.place_mm.x + s * (to.place_mm.x - from.place_mm.x),
+              from.place_mm.y + s * (to.place_mm.y - from.place_mm.y)};
     }
     from = to;
   }
-  return {from.x_mm, from.y_mm};
+  return {from.place_mm.x, from.place_mm.y};
 }
 
 // A full turn of radius 5 mm in 0.5 s, from rest to rest, for a move along its chord.
@@ -230,7 +231,7 @@ TEST_F(Turn, MovesTheNozzleByNoMoreThanTheTolerance) {
     how.lines.tolerance_mm = tolerance_mm;
     how.lines.max_speed_step_mm_s = 1e6;
     const std::vector<Stroke> drawn = path_.draw(base_, how);
-    const double worst = nozzle_error_mm(drawn, how.lines.nozzle_x);
+    const double worst = nozzle_error_mm(drawn, how.lines.nozzle.x);
     // Each line alone is within the tolerance, but its neighbours add to the error.
     EXPECT_LE(worst, 3.0 * tolerance_mm + 0.5e-4);
     EXPECT_GE(worst, 0.3 * tolerance_mm) << "lines could be longer";
@@ -247,8 +248,8 @@ TEST_F(Turn, MakesUpForACoarseGrid) {
   std::vector<double> times = {0.0};
   append_line_ends(base_, 0.0, kDuration_s, how.lines, times);
   const auto rms_mm = [&](double step_mm, double then_rounded_to_mm) {
-    const auto place = [&](BaseAxis axis) {
-      std::vector<double> at = VertexChooser(base_, axis, how.lines.nozzle_x)
+    const auto place = [&](std::size_t axis) {
+      std::vector<double> at = VertexChooser(base_, axis, how.lines.nozzle.x)
                                    .choose(times, {0.0, step_mm}, {}, {})
                                    .position_mm;
       for (std::size_t i = 1; i + 1 < at.size(); ++i) {
@@ -257,13 +258,13 @@ TEST_F(Turn, MakesUpForACoarseGrid) {
       }
       return at;
     };
-    const auto x = place(&dynamics::BaseTrajectory::x);
-    const auto y = place(&dynamics::BaseTrajectory::y);
+    const auto x = place(0);
+    const auto y = place(1);
     std::vector<Stroke> drawn;
     for (std::size_t i = 1; i < times.size(); ++i) {
       drawn.push_back({times[i], x[i], y[i]});
     }
-    return nozzle_error_mm(drawn, how.lines.nozzle_x, true);
+    return nozzle_error_mm(drawn, how.lines.nozzle.x, true);
   };
   EXPECT_LT(rms_mm(1e-4, 1e-4), 1e-3);
   EXPECT_LT(rms_mm(kCoarse_mm, kCoarse_mm), 0.7 * rms_mm(1e-4, kCoarse_mm));
@@ -278,7 +279,7 @@ TEST_F(Turn, ChangesSpeedInSmallSteps) {
     double last_v = 0.0;
     double largest = 0.0;
     for (const Stroke& to : path_.draw(base_, how)) {
-      const double v = (to.x_mm - from.x_mm) / (to.end_s - from.end_s);
+      const double v = (to.place_mm.x - from.place_mm.x) / (to.end_s - from.end_s);
       largest = std::max(largest, std::abs(v - last_v));
       last_v = v;
       from = to;
@@ -302,8 +303,8 @@ TEST_F(Turn, ChangesTheSpeedOfSharedMotorsInSmallSteps) {
     double largest = 0.0;
     for (const Stroke& to : path_.draw(base_, how)) {
       const double duration_s = to.end_s - from.end_s;
-      const std::array<double, 2> v = {(to.x_mm - from.x_mm) / duration_s,
-                                       (to.y_mm - from.y_mm) / duration_s};
+      const std::array<double, 2> v = {(to.place_mm.x - from.place_mm.x) / duration_s,
+                                       (to.place_mm.y - from.place_mm.y) / duration_s};
       if (from.end_s > 0.0) {
         largest = std::max(largest, std::abs(v[0] - last[0]) + std::abs(v[1] - last[1]));
       }
@@ -357,8 +358,8 @@ TEST_F(Turn, DrivesTheLinesNoHarderThanTheBaseWhereThatIsAboveTheLimit) {
   for (std::size_t i = 2; i < drawn.size(); ++i) {
     const double before_s = drawn[i - 1].end_s - drawn[i - 2].end_s;
     const double after_s = drawn[i].end_s - drawn[i - 1].end_s;
-    const double change = (drawn[i].x_mm - drawn[i - 1].x_mm) / after_s -
-                          (drawn[i - 1].x_mm - drawn[i - 2].x_mm) / before_s;
+    const double change = (drawn[i].place_mm.x - drawn[i - 1].place_mm.x) / after_s -
+                          (drawn[i - 1].place_mm.x - drawn[i - 2].place_mm.x) / before_s;
     const double rounding = 4e-4 / std::min(before_s, after_s);
     EXPECT_LE(std::abs(change), 1.02 * largest * 0.5 * (before_s + after_s) + rounding);
   }
@@ -367,10 +368,10 @@ TEST_F(Turn, DrivesTheLinesNoHarderThanTheBaseWhereThatIsAboveTheLimit) {
 TEST_F(Turn, GoesNoFurtherOutThanTheBase) {
   // The base may touch the end of its travel at the outermost points.
   EmitOptions how = options();
-  how.lines.reach_x = how.lines.reach_y = {98.0, 102.0};
+  how.lines.reach.x = how.lines.reach.y = {98.0, 102.0};
   for (const Stroke& stroke : path_.draw(base_, how)) {
-    EXPECT_LE(std::abs(stroke.x_mm - 100.0), kRadius_mm + 0.51e-4);
-    EXPECT_LE(std::abs(stroke.y_mm - 100.0), kRadius_mm + 0.51e-4);
+    EXPECT_LE(std::abs(stroke.place_mm.x - 100.0), kRadius_mm + 0.51e-4);
+    EXPECT_LE(std::abs(stroke.place_mm.y - 100.0), kRadius_mm + 0.51e-4);
   }
 }
 
@@ -390,7 +391,7 @@ TEST(Strokes, KeepTheAccelerationFromLineToLine) {
   Stroke from{0.0, 0.0, 0.0};
   for (const Stroke& to : drawn) {
     const double t = to.end_s - from.end_s;
-    const double v = (to.x_mm - from.x_mm) / t;
+    const double v = (to.place_mm.x - from.place_mm.x) / t;
     if (last_t > 0.0) {
       // Rounding to the grid adds up to 2·10⁻⁴ mm over the square of the shorter time.
       EXPECT_LE(std::abs(v - last_v) / (0.5 * (t + last_t)),
@@ -412,7 +413,7 @@ TEST(Strokes, MergeWhatWouldHaveNoLength) {
   const std::vector<Stroke> drawn = path.draw(testing::sampled(halting, 0.55));
   Stroke from{0.0, 0.0, 0.0};
   for (const Stroke& to : drawn) {
-    EXPECT_GE(std::abs(to.x_mm - from.x_mm), 0.5e-4);
+    EXPECT_GE(std::abs(to.place_mm.x - from.place_mm.x), 0.5e-4);
     EXPECT_GT(to.speed_mm_s, 0.0);
     from = to;
   }
@@ -421,7 +422,7 @@ TEST(Strokes, MergeWhatWouldHaveNoLength) {
   EXPECT_GE(drawn.back().end_s, 0.27);
   EXPECT_LE(drawn.back().end_s, 0.27 + 0.1);
   EXPECT_EQ(drawn.back().e_mm, 1.0);
-  EXPECT_EQ(drawn.back().x_mm, 10.0);
+  EXPECT_EQ(drawn.back().place_mm.x, 10.0);
 }
 
 TEST(Strokes, AreNoneWhereNothingMoves) {
@@ -456,7 +457,7 @@ TEST(Strokes, LayFilamentMoveByMove) {
   // This nozzle stays with the base, so it passes from move to move when the plan does. The limit
   // is raised because Klipper would otherwise require jumps of the flow to be levelled.
   EmitOptions how = options();
-  how.lines.nozzle_x = how.lines.nozzle_y = dynamics::from_frequency(2000.0, 0.5);
+  how.lines.nozzle.x = how.lines.nozzle.y = dynamics::from_frequency(2000.0, 0.5);
   how.fixed.instantaneous_corner_velocity_mm_s = 1e6;
   constexpr double kFilament_mm = 5e-4;  // a tenth of what a line lays
   for (unsigned seed = 1; seed <= 10; ++seed) {

@@ -69,8 +69,8 @@ class Vertices : public ::testing::TestWithParam<unsigned> {
  protected:
   [[nodiscard]] Measured measure(const std::vector<double>& times, const SpeedSteps& most,
                                  const Ends& ends = {}) const {
-    const AxisVertices chosen = VertexChooser(base_, &dynamics::BaseTrajectory::x, nozzle_)
-                                    .choose(times, {0.0, kGrid_mm}, {}, most, ends);
+    const AxisVertices chosen =
+        VertexChooser(base_, 0, nozzle_).choose(times, {0.0, kGrid_mm}, {}, most, ends);
     Measured result;
     double last = ends.from_rest ? 0.0 : base_.x.velocity_mm_s.front();
     double square = 0.0;
@@ -136,8 +136,8 @@ TEST_P(Vertices, FollowABaseThatNeedsAllThatIsAllowed) {
 
 TEST_P(Vertices, KeepTheAccelerationBetweenTheMiddlesOfLines) {
   const std::vector<double> times = short_lines();
-  const AxisVertices chosen = VertexChooser(base_, &dynamics::BaseTrajectory::x, nozzle_)
-                                  .choose(times, {0.0, kGrid_mm}, {}, {1e9, 19500.0});
+  const AxisVertices chosen =
+      VertexChooser(base_, 0, nozzle_).choose(times, {0.0, kGrid_mm}, {}, {1e9, 19500.0});
   for (std::size_t k = 2; k < times.size(); ++k) {
     const double before_s = times[k - 1] - times[k - 2];
     const double after_s = times[k] - times[k - 1];
@@ -157,7 +157,7 @@ TEST_P(Vertices, TakeHalfOfTheChangeWhereOthersGoOn) {
   moving.y = moving.x;
   base_ = moving;
   const AxisVertices chosen =
-      VertexChooser(base_, &dynamics::BaseTrajectory::x, nozzle_)
+      VertexChooser(base_, 0, nozzle_)
           .choose(short_lines(), {0.0, kGrid_mm}, {}, {28.5, 1e9}, {false, true});
   const double first = (chosen.position_mm[1] - chosen.position_mm[0]) / short_lines()[1];
   EXPECT_LE(std::abs(first - moving.x.velocity_mm_s.front()), nearly(0.5 * 28.5));
@@ -166,8 +166,8 @@ TEST_P(Vertices, TakeHalfOfTheChangeWhereOthersGoOn) {
 TEST_P(Vertices, StayWithinReach) {
   const std::vector<double>& x = base_.x.position_mm;
   const Reach reach{*std::ranges::min_element(x) + 1.0, *std::ranges::max_element(x) + 1e-3};
-  const AxisVertices chosen = VertexChooser(base_, &dynamics::BaseTrajectory::x, nozzle_)
-                                  .choose(short_lines(), {0.0, kGrid_mm}, reach, {28.5, 1e9});
+  const AxisVertices chosen =
+      VertexChooser(base_, 0, nozzle_).choose(short_lines(), {0.0, kGrid_mm}, reach, {28.5, 1e9});
   for (const double at : chosen.position_mm) {
     EXPECT_GE(at, *std::ranges::min_element(x) - kGrid_mm) << "the base's own reach counts";
     EXPECT_LE(at, reach.max_mm + kGrid_mm);

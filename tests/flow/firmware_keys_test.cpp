@@ -62,8 +62,7 @@ TEST_P(FirmwareKey, ChangesThePlan) {
   overrides.push_back(tested.setting);
   const Inspection after = plan(overrides);
   EXPECT_TRUE(before.reference_time_s != after.reference_time_s || before.moves != after.moves ||
-              before.filament_mm != after.filament_mm || before.x_max_mm != after.x_max_mm ||
-              before.y_max_mm != after.y_max_mm);
+              before.filament_mm != after.filament_mm || before.max_mm != after.max_mm);
 }
 
 INSTANTIATE_TEST_SUITE_P(

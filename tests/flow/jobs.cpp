@@ -36,10 +36,10 @@ machine::Settings settings(const std::vector<std::string>& overrides) {
   // A Klipper has a shaper, so that every test sees it switched off and on again.
   machine::PrinterSettings& printer = loaded->printer;
   if (printer.firmware == Firmware::klipper) {
-    printer.input_shaper_freq_x_hz =
-        printer.input_shaper_freq_x_hz.value_or(loaded->dynamics_x.freq_hz);
-    printer.input_shaper_freq_y_hz =
-        printer.input_shaper_freq_y_hz.value_or(loaded->dynamics_y.freq_hz);
+    printer.input_shaper_freq_hz.x =
+        printer.input_shaper_freq_hz.x.value_or(loaded->dynamics.x.freq_hz);
+    printer.input_shaper_freq_hz.y =
+        printer.input_shaper_freq_hz.y.value_or(loaded->dynamics.y.freq_hz);
   }
   return *loaded;
 }

@@ -129,8 +129,8 @@ TEST(Robustness, IsReportedForEveryPrint) {
   SilentProgress progress;
   ASSERT_TRUE(compensate(folder.job(), progress).has_value());
   Job job = folder.job();
-  job.settings.dynamics_x.freq_hz *= 1.1;
-  job.settings.dynamics_y.freq_hz *= 1.1;
+  job.settings.dynamics.x.freq_hz *= 1.1;
+  job.settings.dynamics.y.freq_hz *= 1.1;
   const Result<report::Report> verified = verify(job, progress);
   ASSERT_TRUE(verified.has_value());
   EXPECT_NEAR(report.sensitivity[4].compensated.rms_mm,

@@ -107,7 +107,8 @@ TEST(Tune, ThreeRoundsFindAxesThatNobodyKnows) {
 // A tower of three bands that are all made for the same, so that one model verifies them all.
 tune::TowerSettings even_tower(const machine::Settings& settings) {
   tune::TowerSettings towers = tower_settings(settings, {});
-  for (tune::Trial& trial : towers.trials) {
+  for (std::size_t axis = 0; axis < towers.trials.kCount; ++axis) {
+    tune::Trial& trial = towers.trials[axis];
     trial = tune::next_trial({.freq_hz = 45.0, .freq_error = 0.02, .damping_ratio = 0.06},
                              towers.accel_mm_s2);
     trial.bands = 3;

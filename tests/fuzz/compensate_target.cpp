@@ -161,7 +161,7 @@ void check_end(const Playback& input, const Playback& output, const machine::Set
     return fmt::format("G9{} M8{} unit {} M220 {} M221 {} retracted {} G{} shaper {} {}",
                        state.absolute_xyz ? 0 : 1, state.absolute_e ? 2 : 3, state.unit_mm,
                        state.speed_factor, state.flow_factor, state.retracted, state.plane,
-                       state.shaper_freq_x_hz, state.shaper_freq_y_hz);
+                       state.shaper_freq_hz.x, state.shaper_freq_hz.y);
   };
   require(modes(input.end) == modes(output.end),
           fmt::format("{} at the end instead of {}", modes(output.end), modes(input.end)));

@@ -35,7 +35,7 @@ PrinterSetup printer_setup(std::size_t variant) {
     setup.interpreter.arc_resolution_mm = 0.1;
     setup.interpreter.marlin_arcs.circles = true;
     setup.interpreter.marlin_arcs.segments_per_s = 40.0;
-    setup.interpreter.shaper_freq_x_hz = 45.0;
+    setup.interpreter.shaper_freq_hz.x = 45.0;
     setup.fixed.classic_jerk = true;
     setup.fixed.jd_handle_small_segments = false;
     setup.fixed.block_buffer_size = setup.fixed.ring_length = 4;

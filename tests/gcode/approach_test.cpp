@@ -85,7 +85,7 @@ TEST(Approach, OfALineThatDrawsBehindAMoveFromNowhereIsAPause) {
   EXPECT_EQ(ahead("G1 X10 Y20 Z1 F6000\nG1 E4 F600\n"), std::nullopt);
   EXPECT_EQ(ahead("G1 X10 Y20 Z1 F6000\nG4 P200\n"), std::nullopt);
   EXPECT_EQ(ahead("G1 X10 Y20 Z1 F6000\nG1 X30 F600\n"), std::nullopt);
-  options.shaper_freq_x_hz = options.shaper_freq_y_hz = 45.0;
+  options.shaper_freq_hz.x = options.shaper_freq_hz.y = 45.0;
   EXPECT_EQ(ahead("G1 X10 Y20 Z1 F6000\n"), std::nullopt);
 }
 

@@ -249,17 +249,17 @@ TEST(PressureAdvance, StopsOnlyWhenItIsSwitchedOnOrOff) {
 
 TEST(InputShaper, IsKeptForItsRestoration) {
   InterpreterOptions options;
-  options.shaper_freq_x_hz = 45.0;
+  options.shaper_freq_hz.x = 45.0;
   Session session(options);
   EXPECT_EQ(session.state().shaper, ShaperSettings{}) << "the configuration's";
   session.read("SET_INPUT_SHAPER SHAPER_FREQ_Y=38 SHAPER_TYPE=ei DAMPING_RATIO_X=0.08");
   session.read("SET_INPUT_SHAPER SHAPER_TYPE_Y=mzv");
-  EXPECT_EQ(session.state().shaper_freq_x_hz, 45.0);
-  EXPECT_EQ(session.state().shaper_freq_y_hz, 38.0);
-  EXPECT_EQ(session.state().shaper.type_x, "ei");
-  EXPECT_EQ(session.state().shaper.type_y, "mzv");
-  EXPECT_EQ(session.state().shaper.damping_ratio_x, 0.08);
-  EXPECT_EQ(session.state().shaper.damping_ratio_y, std::nullopt);
+  EXPECT_EQ(session.state().shaper_freq_hz.x, 45.0);
+  EXPECT_EQ(session.state().shaper_freq_hz.y, 38.0);
+  EXPECT_EQ(session.state().shaper.type.x, "ei");
+  EXPECT_EQ(session.state().shaper.type.y, "mzv");
+  EXPECT_EQ(session.state().shaper.damping_ratio.x, 0.08);
+  EXPECT_EQ(session.state().shaper.damping_ratio.y, std::nullopt);
 }
 
 }  // namespace

@@ -90,18 +90,18 @@ TEST(Frequencies, ThatNoPrinterHasBringANote) {
 TEST(ShaperFrequency, IsNeverThatOfTheDynamics) {
   const std::vector<std::string> dynamics = {"dynamics.x.freq_hz=50", "dynamics.y.freq_hz=40"};
   const Settings s = read("[printer]\ninput_shaper_freq_y_hz = 42\n", dynamics);
-  EXPECT_TRUE(s.shaper_unknown_x());
-  EXPECT_FALSE(s.shaper_unknown_y());
+  EXPECT_TRUE(s.shaper_unknown().x);
+  EXPECT_FALSE(s.shaper_unknown().y);
   EXPECT_EQ(told(s, "printer.input_shaper_freq_x_hz"), " default");
   EXPECT_THAT(to_toml(s), HasSubstr("# input_shaper_freq_x_hz is unset: not known\n"));
-  EXPECT_DOUBLE_EQ(s.shaper_freq_y_hz(), 42.0);
-  EXPECT_TRUE(read("", {"printer.firmware=marlin"}).shaper_unknown_x());
+  EXPECT_DOUBLE_EQ(s.shaper_freq_hz().y, 42.0);
+  EXPECT_TRUE(read("", {"printer.firmware=marlin"}).shaper_unknown().x);
   // RepRapFirmware has one shaper for both axes.
   const Settings rrf = read("", {"printer.firmware=rrf", "printer.input_shaper_freq_x_hz=0"});
-  EXPECT_FALSE(rrf.shaper_unknown_x() || rrf.shaper_unknown_y());
+  EXPECT_FALSE(rrf.shaper_unknown().x || rrf.shaper_unknown().y);
   // The command that switches it off does harm there.
   EXPECT_FALSE(
-      read("", {"printer.firmware=marlin", "printer.variant=snapmaker_j1"}).shaper_unknown_x());
+      read("", {"printer.firmware=marlin", "printer.variant=snapmaker_j1"}).shaper_unknown().x);
 }
 
 TEST(SpeedStep, IsKeptOrRefused) {

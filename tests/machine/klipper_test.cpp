@@ -92,16 +92,16 @@ TEST_F(KlipperFiles, GiveAResonanceNearAMeasuredOne) {
                                       type, freq_hz, freq_hz));
   };
   const Settings measured = good(file("mzv", 63.4));
-  EXPECT_NEAR(measured.dynamics_x.freq_hz, 61.1, 0.05 * 61.1);
-  EXPECT_DOUBLE_EQ(measured.shaper_freq_x_hz(), 63.4) << "set back as it was";
-  EXPECT_DOUBLE_EQ(good(file("zv", 50.5)).dynamics_y.freq_hz, 50.0);
-  EXPECT_DOUBLE_EQ(good(file("ei", 62.0)).dynamics_y.freq_hz, 50.0);
-  EXPECT_DOUBLE_EQ(good(file("2hump_ei", 80.0)).dynamics_x.freq_hz, 50.0);
-  EXPECT_DOUBLE_EQ(good(file("3hump_ei", 100.5)).dynamics_x.freq_hz, 50.0);
+  EXPECT_NEAR(measured.dynamics.x.freq_hz, 61.1, 0.05 * 61.1);
+  EXPECT_DOUBLE_EQ(measured.shaper_freq_hz().x, 63.4) << "set back as it was";
+  EXPECT_DOUBLE_EQ(good(file("zv", 50.5)).dynamics.y.freq_hz, 50.0);
+  EXPECT_DOUBLE_EQ(good(file("ei", 62.0)).dynamics.y.freq_hz, 50.0);
+  EXPECT_DOUBLE_EQ(good(file("2hump_ei", 80.0)).dynamics.x.freq_hz, 50.0);
+  EXPECT_DOUBLE_EQ(good(file("3hump_ei", 100.5)).dynamics.x.freq_hz, 50.0);
   const Settings unknown = good(file("mzv(n=4)", 50.0));
   EXPECT_THAT(unknown.guesses, SizeIs(1)) << "nothing to derive from";
-  EXPECT_EQ(unknown.shaper_type_x(), "mzv(n=4)");
-  EXPECT_EQ(good(file("mzv(n=2)", 50.0)).shaper_type_x(), "mzv") << "Klipper refuses it";
+  EXPECT_EQ(unknown.shaper_type().x, "mzv(n=4)");
+  EXPECT_EQ(good(file("mzv(n=2)", 50.0)).shaper_type().x, "mzv") << "Klipper refuses it";
 }
 
 TEST_F(KlipperFiles, TellNothingOfTheirShapersOnceBothResonancesAreGiven) {
@@ -121,7 +121,7 @@ TEST_F(KlipperFiles, WithoutAShaperHaveNoneToSetBackAndAnUnknownResonance) {
       good(write("printer.cfg",
                  "[printer]\nkinematics: cartesian\nmax_velocity: 200\nmax_accel: 1000\n[mcu]\n"));
   EXPECT_EQ(told(s, "printer.input_shaper_freq_x_hz"), "0 printer.cfg");
-  EXPECT_FALSE(s.shaper_unknown_x());
+  EXPECT_FALSE(s.shaper_unknown().x);
   EXPECT_EQ(told(s, "printer.firmware_retraction"), "false printer.cfg");
   EXPECT_EQ(told(s, "dynamics.x.freq_hz"), "45 default");
   ASSERT_THAT(s.guesses, SizeIs(1));
@@ -214,13 +214,13 @@ TEST_F(KlipperFiles, SayWhereTheSteppersOfCarriagesMayBe) {
 TEST_F(KlipperFiles, LeaveOpenWhatAMissingIncludeMaySay) {
   const std::string text = "[printer]\nkinematics: corexy\nmax_velocity: 200\nmax_accel: 1000\n";
   const Settings s = good(write("a.cfg", text + "[include shaper.cfg]\n"));
-  EXPECT_FALSE(s.printer.input_shaper_freq_x_hz);
-  EXPECT_FALSE(s.printer.input_shaper_freq_y_hz);
+  EXPECT_FALSE(s.printer.input_shaper_freq_hz.x);
+  EXPECT_FALSE(s.printer.input_shaper_freq_hz.y);
   EXPECT_THAT(told(s, "printer.firmware_retraction"), EndsWith("default"));
   ASSERT_THAT(s.guesses, SizeIs(1));
   EXPECT_THAT(s.guesses[0].message, ::testing::ContainsRegex("; it may be in .*/shaper.cfg \\("));
   const Settings whole = good(write("b.cfg", text));
-  EXPECT_EQ(whole.printer.input_shaper_freq_x_hz, 0.0);
+  EXPECT_EQ(whole.printer.input_shaper_freq_hz.x, 0.0);
   ASSERT_THAT(whole.guesses, SizeIs(1));
   EXPECT_THAT(whole.guesses[0].message, ::testing::Not(HasSubstr("it may be in")));
 }

@@ -116,7 +116,7 @@ TEST_P(LineTest, AsksForWhatItSays) {
   }
   EXPECT_LE(test.stages.front().label_lines_per_s, settings.max_lines_per_s() / 2.0);
   EXPECT_GE(test.stages.back().label_lines_per_s, 2.0 * settings.max_lines_per_s());
-  if (const auto travel = settings.printer.travel_x_mm) {
+  if (const auto travel = settings.printer.travel_mm.x) {
     EXPECT_GE(test.x_min_mm, travel->min);
     EXPECT_LE(test.x_max_mm, travel->max);
   }

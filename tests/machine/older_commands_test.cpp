@@ -202,7 +202,7 @@ TEST(Damping, ThatNoPrinterHasIsNotTakenForTheAxis) {
              "printer.cfg");
     EXPECT_THAT(told(s, "dynamics.x.damping_ratio"), HasSubstr("default")) << ratio;
     EXPECT_EQ(told(s, "dynamics.y.damping_ratio"), "0.08 printer.cfg:11");
-    EXPECT_EQ(s.shaper_damping_ratio_x(), ratio);  // the shaper is made for it all the same
+    EXPECT_EQ(s.shaper_damping_ratio().x, ratio);  // the shaper is made for it all the same
     EXPECT_THAT(notes(s), Contains(HasSubstr("printer.cfg:10: warning: a damping ratio of")));
     EXPECT_THAT(read(fmt::format("{}damping_ratio_x: {}\n", kKlipper, ratio), "printer.cfg",
                      {"dynamics.x.damping_ratio=0.05"})
@@ -217,7 +217,7 @@ TEST(Damping, ThatNoPrinterHasIsNotTakenForTheAxis) {
 
 TEST(Damping, OfTheUsersOwnCountsAndBringsANote) {
   const Settings s = read(kKlipper, "printer.cfg", {"dynamics.x.damping_ratio=0.6"});
-  EXPECT_DOUBLE_EQ(s.dynamics_x.damping_ratio, 0.6);
+  EXPECT_DOUBLE_EQ(s.dynamics.x.damping_ratio, 0.6);
   EXPECT_THAT(notes(s), Contains(HasSubstr("dynamics.x.damping_ratio is 0.6, but printers have")));
 }
 
@@ -262,8 +262,8 @@ TEST(KalicoReferences, AreFollowed) {
       "printer.cfg");
   EXPECT_EQ(told(s, "limits.max_accel_mm_s2"), "7000 printer.cfg:8");
   EXPECT_EQ(told(s, "limits.max_velocity_mm_s"), "350 printer.cfg:7");
-  EXPECT_DOUBLE_EQ(s.shaper_freq_x_hz(), 42.0);
-  EXPECT_DOUBLE_EQ(s.shaper_freq_y_hz(), 42.5);
+  EXPECT_DOUBLE_EQ(s.shaper_freq_hz().x, 42.0);
+  EXPECT_DOUBLE_EQ(s.shaper_freq_hz().y, 42.5);
 }
 
 TEST(KalicoReferences, ThatLeadNowhereAreNamed) {

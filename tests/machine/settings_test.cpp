@@ -57,12 +57,12 @@ TEST(Settings, ThatWereSetInCodeAreChecked) {
   };
   EXPECT_EQ(complaint([](Settings& s) { s.limits.max_accel_mm_s2 = -1.0; }),
             "limits.max_accel_mm_s2 is -1, but must be > 0");
-  EXPECT_THAT(complaint([](Settings& s) { s.dynamics_y.freq_hz = std::nan(""); }),
+  EXPECT_THAT(complaint([](Settings& s) { s.dynamics.y.freq_hz = std::nan(""); }),
               HasSubstr("dynamics.y.freq_hz must be a finite number"));
   EXPECT_THAT(complaint([](Settings& s) { s.printer.transport = "pigeon"; }),
               HasSubstr("printer.transport must be one of"));
   EXPECT_THAT(complaint([](Settings& s) {
-                s.printer.travel_x_mm = Range{200.0, 0.0};
+                s.printer.travel_mm.x = Range{200.0, 0.0};
               }),
               HasSubstr("printer.travel_x_mm"));
   EXPECT_THAT(complaint([](Settings& s) { s.solve.overlap_s = 2.0 * s.solve.window_s; }),
@@ -82,9 +82,9 @@ TEST(Settings, WithoutAFileAreTheDefaults) {
   const Result<Settings> settings = load(std::nullopt, {});
   ASSERT_TRUE(settings);
   EXPECT_EQ(settings->printer.firmware, Firmware::klipper);
-  EXPECT_FALSE(settings->printer.travel_x_mm);
+  EXPECT_FALSE(settings->printer.travel_mm.x);
   EXPECT_DOUBLE_EQ(settings->limits.max_velocity_mm_s, 300.0);
-  EXPECT_DOUBLE_EQ(settings->dynamics_y.freq_hz, 45.0);
+  EXPECT_DOUBLE_EQ(settings->dynamics.y.freq_hz, 45.0);
   EXPECT_EQ(origin(*settings, "limits.max_velocity_mm_s"), "default");
 }
 
@@ -114,17 +114,17 @@ period_ms = 0.5
 [verify]
 step_ms = 0.05
 )");
-  ASSERT_TRUE(s.printer.travel_x_mm && s.printer.travel_y_mm);
-  EXPECT_DOUBLE_EQ(s.printer.travel_x_mm->min, -5.0);
-  EXPECT_DOUBLE_EQ(s.printer.travel_x_mm->max, 250.5);
-  EXPECT_DOUBLE_EQ(s.printer.travel_y_mm->max, 210.0);
+  ASSERT_TRUE(s.printer.travel_mm.x && s.printer.travel_mm.y);
+  EXPECT_DOUBLE_EQ(s.printer.travel_mm.x->min, -5.0);
+  EXPECT_DOUBLE_EQ(s.printer.travel_mm.x->max, 250.5);
+  EXPECT_DOUBLE_EQ(s.printer.travel_mm.y->max, 210.0);
   EXPECT_FALSE(s.printer.firmware_retraction);
   EXPECT_DOUBLE_EQ(s.limits.max_accel_mm_s2, 3000.0);
   EXPECT_DOUBLE_EQ(s.extruder.nozzle_diameter_mm, 0.6);
-  EXPECT_DOUBLE_EQ(s.dynamics_x.freq_hz, 52.5);
-  EXPECT_DOUBLE_EQ(s.dynamics_x.damping_ratio, 0.1);
-  EXPECT_DOUBLE_EQ(s.dynamics_y.freq_hz, 40.0);
-  EXPECT_DOUBLE_EQ(s.dynamics_y.damping_ratio, 0.06);
+  EXPECT_DOUBLE_EQ(s.dynamics.x.freq_hz, 52.5);
+  EXPECT_DOUBLE_EQ(s.dynamics.x.damping_ratio, 0.1);
+  EXPECT_DOUBLE_EQ(s.dynamics.y.freq_hz, 40.0);
+  EXPECT_DOUBLE_EQ(s.dynamics.y.damping_ratio, 0.06);
   EXPECT_DOUBLE_EQ(s.base.max_jerk_mm_s3, 1e8);
   EXPECT_DOUBLE_EQ(s.tail_s(), 0.005);
   EXPECT_DOUBLE_EQ(s.period_ms(), 0.5);
@@ -149,8 +149,8 @@ TEST(Overrides, TakeEveryTypeOfValue) {
   const Settings s = read("", {"printer.travel_x_mm=[0,250]", "printer.firmware=klipper",
                                "printer.firmware_retraction=false", "emit.accel_mm_s2=2e6",
                                "limits.max_velocity_mm_s=+200"});
-  ASSERT_TRUE(s.printer.travel_x_mm);
-  EXPECT_DOUBLE_EQ(s.printer.travel_x_mm->max, 250.0);
+  ASSERT_TRUE(s.printer.travel_mm.x);
+  EXPECT_DOUBLE_EQ(s.printer.travel_mm.x->max, 250.0);
   EXPECT_FALSE(s.printer.firmware_retraction);
   EXPECT_DOUBLE_EQ(s.emit_accel_mm_s2(), 2e6);
   EXPECT_DOUBLE_EQ(s.limits.max_velocity_mm_s, 200.0);
@@ -161,9 +161,9 @@ TEST(Overrides, TakeEveryTypeOfValue) {
 TEST(Dynamics, FollowFromMassStiffnessAndDamping) {
   const Settings s =
       read("[dynamics.x]\nmass_g = 1000\nstiffness_n_mm = 10\ndamping_n_s_mm = 0.1\n");
-  EXPECT_NEAR(s.dynamics_x.freq_hz, 100.0 / (2.0 * std::numbers::pi), 1e-12);
-  EXPECT_NEAR(s.dynamics_x.damping_ratio, 0.5, 1e-12);
-  EXPECT_DOUBLE_EQ(s.dynamics_y.freq_hz, 45.0);
+  EXPECT_NEAR(s.dynamics.x.freq_hz, 100.0 / (2.0 * std::numbers::pi), 1e-12);
+  EXPECT_NEAR(s.dynamics.x.damping_ratio, 0.5, 1e-12);
+  EXPECT_DOUBLE_EQ(s.dynamics.y.freq_hz, 45.0);
   EXPECT_EQ(origin(s, "dynamics.x.freq_hz"), "printer.toml:2");
 }
 
@@ -173,14 +173,14 @@ TEST(Overrides, OfOneFormOfTheDynamicsReplaceTheOther) {
   const std::vector<std::string> by_mass = {
       "dynamics.x.mass_g=1000", "dynamics.x.stiffness_n_mm=10", "dynamics.x.damping_n_s_mm=0.1"};
   const Settings mass = read(modal, by_mass);
-  EXPECT_NEAR(mass.dynamics_x.freq_hz, 100.0 / (2.0 * std::numbers::pi), 1e-12);
-  EXPECT_NEAR(mass.dynamics_x.damping_ratio, 0.5, 1e-12);
+  EXPECT_NEAR(mass.dynamics.x.freq_hz, 100.0 / (2.0 * std::numbers::pi), 1e-12);
+  EXPECT_NEAR(mass.dynamics.x.damping_ratio, 0.5, 1e-12);
   EXPECT_EQ(origin(mass, "dynamics.x.freq_hz"), "--set");
   const Settings freq =
       read("[dynamics.x]\nmass_g = 1000\nstiffness_n_mm = 10\ndamping_n_s_mm = 0.1\n",
            {"dynamics.x.freq_hz=30"});
-  EXPECT_DOUBLE_EQ(freq.dynamics_x.freq_hz, 30.0);
-  EXPECT_NEAR(freq.dynamics_x.damping_ratio, 0.5, 1e-12);
+  EXPECT_DOUBLE_EQ(freq.dynamics.x.freq_hz, 30.0);
+  EXPECT_NEAR(freq.dynamics.x.damping_ratio, 0.5, 1e-12);
   std::vector<std::string> both = by_mass;
   both.emplace_back("dynamics.x.freq_hz=30");
   EXPECT_FALSE(parse(modal, "printer.toml", both));
@@ -346,42 +346,42 @@ TEST(Tail, LastsTwoMillisecondsAtLeast) {
 
 TEST(ShaperFrequency, IsOneForBothAxesOfRepRapFirmware) {
   const std::vector<std::string> rrf = {"printer.firmware=rrf"};
-  EXPECT_DOUBLE_EQ(read("", rrf).shaper_freq_y_hz(), 0.0);
+  EXPECT_DOUBLE_EQ(read("", rrf).shaper_freq_hz().y, 0.0);
   const Settings s = read("[printer]\ninput_shaper_freq_x_hz = 41\n", rrf);
-  EXPECT_DOUBLE_EQ(s.shaper_freq_y_hz(), 41.0);
+  EXPECT_DOUBLE_EQ(s.shaper_freq_hz().y, 41.0);
 }
 
 // The default is the firmware's own type, which it uses if a command names none.
 TEST(ShaperType, IsTheFirmwaresDefaultUnlessNamed) {
-  EXPECT_EQ(read("").shaper_type_x(), "mzv");
-  EXPECT_EQ(read("", {"printer.firmware=marlin"}).shaper_type_x(), "zv");
-  EXPECT_EQ(read("", {"printer.firmware=rrf"}).shaper_type_y(), "zvd");
+  EXPECT_EQ(read("").shaper_type().x, "mzv");
+  EXPECT_EQ(read("", {"printer.firmware=marlin"}).shaper_type().x, "zv");
+  EXPECT_EQ(read("", {"printer.firmware=rrf"}).shaper_type().y, "zvd");
   const Settings named = read("[printer]\ninput_shaper_type = \"ei\"\n");
-  EXPECT_EQ(named.shaper_type_x(), "ei");
-  EXPECT_EQ(named.shaper_type_y(), "ei");
-  EXPECT_EQ(read("[printer]\ninput_shaper_type = \"mzv(n=4,t=0.9)\"\n").shaper_type_y(),
+  EXPECT_EQ(named.shaper_type().x, "ei");
+  EXPECT_EQ(named.shaper_type().y, "ei");
+  EXPECT_EQ(read("[printer]\ninput_shaper_type = \"mzv(n=4,t=0.9)\"\n").shaper_type().y,
             "mzv(n=4,t=0.9)");
   const Settings two = read("[printer]\ninput_shaper_type_y = \"zv\"\n");
-  EXPECT_EQ(two.shaper_type_x(), "mzv");
-  EXPECT_EQ(two.shaper_type_y(), "zv");
+  EXPECT_EQ(two.shaper_type().x, "mzv");
+  EXPECT_EQ(two.shaper_type().y, "zv");
 }
 
 TEST(ShaperDampingRatio, IsTheFirmwaresDefaultUnlessGiven) {
-  EXPECT_DOUBLE_EQ(read("").shaper_damping_ratio_x(), 0.1);
-  EXPECT_DOUBLE_EQ(read("", {"printer.firmware=marlin"}).shaper_damping_ratio_y(), 0.15);
-  EXPECT_DOUBLE_EQ(read("", {"printer.firmware=rrf"}).shaper_damping_ratio_y(), 0.1);
+  EXPECT_DOUBLE_EQ(read("").shaper_damping_ratio().x, 0.1);
+  EXPECT_DOUBLE_EQ(read("", {"printer.firmware=marlin"}).shaper_damping_ratio().y, 0.15);
+  EXPECT_DOUBLE_EQ(read("", {"printer.firmware=rrf"}).shaper_damping_ratio().y, 0.1);
   const Settings given = read("[printer]\ninput_shaper_damping_ratio_x = 0.05\n");
-  EXPECT_DOUBLE_EQ(given.shaper_damping_ratio_x(), 0.05);
-  EXPECT_DOUBLE_EQ(given.shaper_damping_ratio_y(), 0.1);
+  EXPECT_DOUBLE_EQ(given.shaper_damping_ratio().x, 0.05);
+  EXPECT_DOUBLE_EQ(given.shaper_damping_ratio().y, 0.1);
 }
 
 TEST(ShaperType, IsAWordInAFileAndInAnOverride) {
-  EXPECT_EQ(read("[printer]\ninput_shaper_type = \"mzv\"\n").printer.input_shaper_type, "mzv");
-  EXPECT_EQ(read("", {"printer.input_shaper_type=ei2"}).printer.input_shaper_type, "ei2");
+  EXPECT_EQ(read("[printer]\ninput_shaper_type = \"mzv\"\n").printer.input_shaper_type.x, "mzv");
+  EXPECT_EQ(read("", {"printer.input_shaper_type=ei2"}).printer.input_shaper_type.x, "ei2");
 }
 
 TEST(ShaperFrequency, OfZeroStaysZero) {
-  EXPECT_DOUBLE_EQ(read("", {"printer.input_shaper_freq_x_hz=0"}).shaper_freq_x_hz(), 0.0);
+  EXPECT_DOUBLE_EQ(read("", {"printer.input_shaper_freq_x_hz=0"}).shaper_freq_hz().x, 0.0);
 }
 
 TEST(ToToml, ReadsBackAsTheSameSettings) {
@@ -399,8 +399,8 @@ TEST(ToToml, ReadsBackAsTheSameSettings) {
   EXPECT_THAT(text, HasSubstr("\nmax_accel_mm_s2 = 3333.3  # --set\n"));
   EXPECT_DOUBLE_EQ(second.limits.max_accel_mm_s2, 3333.3);
   EXPECT_EQ(second.solve.jerk_weight, 1e-9);
-  EXPECT_DOUBLE_EQ(second.printer.travel_y_mm->min, -1.25);
-  EXPECT_FALSE(second.printer.travel_x_mm);
+  EXPECT_DOUBLE_EQ(second.printer.travel_mm.y->min, -1.25);
+  EXPECT_FALSE(second.printer.travel_mm.x);
   EXPECT_FALSE(second.base.max_accel_mm_s2);
 }
 
@@ -465,7 +465,7 @@ const std::string kTwoModes =
 TEST(Modes, AreReadAndWrittenBack) {
   const Result<Settings> read = parse(kTwoModes, "printer.toml", {});
   ASSERT_TRUE(read) << to_string(read.error());
-  const AxisDynamics& x = read->dynamics_x;
+  const AxisDynamics& x = read->dynamics.x;
   ASSERT_EQ(x.modes.size(), 2U);
   EXPECT_EQ(x.modes[1].freq_hz, 110.0);
   EXPECT_EQ(x.modes[1].damping_ratio, 0.1);
@@ -477,22 +477,22 @@ TEST(Modes, AreReadAndWrittenBack) {
   EXPECT_EQ(x.description(), "45 Hz, ζ 0.06, gain 0.8 + 110 Hz, ζ 0.1, gain 0.2");
   const Result<Settings> again = parse(to_toml(*read), "again.toml", {});
   ASSERT_TRUE(again) << to_string(again.error());
-  EXPECT_EQ(again->dynamics_x.description(), x.description());
-  EXPECT_TRUE(again->dynamics_y.modes.empty());
+  EXPECT_EQ(again->dynamics.x.description(), x.description());
+  EXPECT_TRUE(again->dynamics.y.modes.empty());
 }
 
 TEST(Modes, AreOverriddenByOneModeAndTheOtherWayRound) {
   const Result<Settings> one = parse(kTwoModes, "", {"dynamics.x.freq_hz=50"});
   ASSERT_TRUE(one) << to_string(one.error());
-  EXPECT_TRUE(one->dynamics_x.modes.empty());
-  EXPECT_EQ(one->dynamics_x.freq_hz, 50.0);
+  EXPECT_TRUE(one->dynamics.x.modes.empty());
+  EXPECT_EQ(one->dynamics.x.freq_hz, 50.0);
   const std::string modes =
       "dynamics.y.mode=[{freq_hz=40, damping_ratio=0.1, gain=-0.1}, "
       "{freq_hz=60, damping_ratio=0.05, gain=1.1}]";
   const Result<Settings> several = parse("[dynamics.y]\nfreq_hz = 30\n", "", {modes});
   ASSERT_TRUE(several) << to_string(several.error());
-  EXPECT_EQ(several->dynamics_y.freq_hz, 60.0);
-  EXPECT_EQ(several->dynamics_y.slowest_hz(), 40.0);
+  EXPECT_EQ(several->dynamics.y.freq_hz, 60.0);
+  EXPECT_EQ(several->dynamics.y.slowest_hz(), 40.0);
 }
 
 TEST(Modes, AreKnownResonances) {
@@ -535,24 +535,24 @@ constexpr std::string_view kPlants =
 TEST(Plants, AreReadAndWrittenAgain) {
   const Result<Settings> settings = parse(kPlants, "p.toml", {});
   ASSERT_TRUE(settings) << to_string(settings.error());
-  const std::vector<PlantSettings>& plants = settings->dynamics_x.plants;
+  const std::vector<PlantSettings>& plants = settings->dynamics.x.plants;
   ASSERT_EQ(plants.size(), 2U);
   EXPECT_EQ(plants[0].share, 0.25);
   ASSERT_EQ(plants[1].modes.size(), 2U);
   EXPECT_EQ(plants[1].modes[1].freq_hz, 90.0);
   const Result<Settings> again = parse(to_toml(*settings), "again.toml", {});
   ASSERT_TRUE(again) << to_string(again.error());
-  EXPECT_EQ(again->dynamics_x.plants.size(), 2U);
-  EXPECT_EQ(again->dynamics_x.plants[1].modes[0].gain, 0.9);
+  EXPECT_EQ(again->dynamics.x.plants.size(), 2U);
+  EXPECT_EQ(again->dynamics.x.plants[1].modes[0].gain, 0.9);
 }
 
 TEST(Plants, StayBehindIfTheModelIsOverridden) {
   const Result<Settings> other = parse(kPlants, "p.toml", {"dynamics.x.freq_hz=50"});
   ASSERT_TRUE(other);
-  EXPECT_TRUE(other->dynamics_x.plants.empty());
+  EXPECT_TRUE(other->dynamics.x.plants.empty());
   const Result<Settings> kept = parse(kPlants, "p.toml", {"dynamics.y.freq_hz=50"});
   ASSERT_TRUE(kept);
-  EXPECT_EQ(kept->dynamics_x.plants.size(), 2U);
+  EXPECT_EQ(kept->dynamics.x.plants.size(), 2U);
 }
 
 TEST(Plants, ThatAreNoneNameTheirPlace) {

@@ -108,7 +108,7 @@ TEST(MarlinDump, ThatRoundsTheJunctionDeviationBringsANote) {
       read("echo:  M92 X80 Y80\necho:  M205 J0.01\necho:  M593 F40 D0.1\n", "dump.txt");
   ASSERT_THAT(s.notes, SizeIs(2));
   EXPECT_EQ(s.notes[0].place.line, 2);
-  EXPECT_DOUBLE_EQ(s.dynamics_y.freq_hz, 40.0);
+  EXPECT_DOUBLE_EQ(s.dynamics.y.freq_hz, 40.0);
 }
 
 TEST(MarlinDump, ThatRoundsTheJunctionDeviationBringsNoNoteToWhoKnows) {
@@ -266,7 +266,7 @@ TEST(RrfConfig, GivesTravelAsPairsToo) {
   const Settings s = read("M550 P\"x\"\nM208 X-2:210 Y0:200.5 Z0:200\nM593 P\"none\"\n");
   EXPECT_EQ(by_key(s)["printer.travel_x_mm"].value, "[-2, 210]");
   EXPECT_EQ(by_key(s)["printer.travel_y_mm"].value, "[0, 200.5]");
-  EXPECT_DOUBLE_EQ(s.shaper_freq_x_hz(), 0.0);
+  EXPECT_DOUBLE_EQ(s.shaper_freq_hz().x, 0.0);
 }
 
 TEST(RrfConfig, GivesTravelWhateverStandsAroundItsNumbers) {

@@ -73,8 +73,8 @@ TEST(TomlEdit, ReadsBackWhatItWrites) {
   ASSERT_TRUE(edited);
   const Result<Settings> settings = parse(*edited, "printer.toml", {});
   ASSERT_TRUE(settings);
-  EXPECT_DOUBLE_EQ(settings->dynamics_x.freq_hz, 45.294);
-  EXPECT_DOUBLE_EQ(settings->dynamics_x.damping_ratio, 0.0581);
+  EXPECT_DOUBLE_EQ(settings->dynamics.x.freq_hz, 45.294);
+  EXPECT_DOUBLE_EQ(settings->dynamics.x.damping_ratio, 0.0581);
 }
 
 }  // namespace

@@ -25,10 +25,9 @@ FirmwareConfig config_of(Firmware firmware) {
   return config;
 }
 
-gcode::Shaper shaper_of(double freq_x_hz, double freq_y_hz) {
+gcode::Shaper shaper_of(double x_hz, double y_hz) {
   gcode::Shaper shaper;
-  shaper.freq_x_hz = freq_x_hz;
-  shaper.freq_y_hz = freq_y_hz;
+  shaper.freq_hz = {x_hz, y_hz};
   return shaper;
 }
 
@@ -69,7 +68,7 @@ double mean_s(const dynamics::ShaperPulses& pulses) {
 // kin_shaper.c, shift_pulses: each axis by itself.
 TEST(Shaping, KeepsBothAxesOfKlipperInStep) {
   gcode::Shaper shaper = shaper_of(55.2, 43.6);
-  shaper.settings.type_y = "ei";
+  shaper.settings.type.y = "ei";
   const Shaping both = shaping(config_of(Firmware::klipper), shaper);
   EXPECT_NEAR(mean_s(both.x), 0.0, 1e-15);
   EXPECT_NEAR(mean_s(both.y), 0.0, 1e-15);
@@ -89,8 +88,8 @@ TEST(Shaping, OfTheOthersBeginsWithThePlan) {
 
 TEST(Shaping, TakesTypeAndDampingOfTheFileBeforeThoseOfTheConfiguration) {
   gcode::Shaper shaper = kOn;
-  shaper.settings.type_y = "ZV";
-  shaper.settings.damping_ratio_y = 0.2;
+  shaper.settings.type.y = "ZV";
+  shaper.settings.damping_ratio.y = 0.2;
   const Shaping both = shaping(config_of(Firmware::klipper), shaper);
   EXPECT_EQ(both.x.size(), 3U);
   ASSERT_EQ(both.y.size(), 2U);
@@ -99,9 +98,9 @@ TEST(Shaping, TakesTypeAndDampingOfTheFileBeforeThoseOfTheConfiguration) {
 
 TEST(Shaping, OfKlipperHasTheParametersOfItsType) {
   gcode::Shaper shaper = kOn;
-  shaper.settings.type_y = "MZV(n=5, t=1.1)";
+  shaper.settings.type.y = "MZV(n=5, t=1.1)";
   FirmwareConfig config = config_of(Firmware::klipper);
-  config.shaper.type_x = "mzv(n=4,t=0.9)";
+  config.shaper.type.x = "mzv(n=4,t=0.9)";
   const Shaping both = shaping(config, shaper);
   ASSERT_EQ(both.x.size(), 4U);
   ASSERT_EQ(both.y.size(), 5U);
@@ -112,7 +111,7 @@ TEST(Shaping, OfKlipperHasTheParametersOfItsType) {
 
 TEST(Shaping, TakesTheFirmwaresDefaultForATypeThatItDoesNotKnow) {
   gcode::Shaper shaper = kOn;
-  shaper.settings.type_x = "smooth_zv";
+  shaper.settings.type.x = "smooth_zv";
   EXPECT_EQ(shaping(config_of(Firmware::klipper), shaper).x.size(), 3U);
   EXPECT_EQ(shaping(config_of(Firmware::marlin), shaper).x.size(), 2U);
   EXPECT_EQ(shaping(config_of(Firmware::rrf), shaper).x.size(), 3U);
@@ -131,7 +130,7 @@ TEST(Switching, StopsKlipperForBothOfItsFilters) {
 // The type and damping of a shaper that is off do not matter.
 TEST(Switching, DoesNotStopWhereBothAreOff) {
   gcode::Shaper typed = kOff;
-  typed.settings.type_x = "ei";
+  typed.settings.type.x = "ei";
   typed.settings.kept_freq_hz = 40.0;
   for (const Firmware firmware : {Firmware::klipper, Firmware::marlin, Firmware::rrf}) {
     EXPECT_DOUBLE_EQ(switching_s(config_of(firmware), {typed}, {kOff}), 0.0);

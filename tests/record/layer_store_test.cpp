@@ -23,10 +23,8 @@ Stretch stretch(double x0, double y0, double x1, double y1, unsigned char before
   return {.layer = 0,
           .feature = 1,
           .line = 7,
-          .x0_mm = x0,
-          .y0_mm = y0,
-          .x1_mm = x1,
-          .y1_mm = y1,
+          .from_mm = {x0, y0},
+          .to_mm = {x1, y1},
           .before = before,
           .after = after};
 }
@@ -50,7 +48,11 @@ void add_rings(LayerStore& store, std::size_t layers, std::size_t rings, std::si
       for (std::size_t i = 0; i < points; ++i) {
         const double next_x = x + 1.0 + noise(random);
         const double next_y = y + noise(random);
-        store.add({number, ring % 3, line++, x, y, next_x, next_y,
+        store.add({number,
+                   ring % 3,
+                   line++,
+                   {x, y},
+                   {next_x, next_y},
                    static_cast<unsigned char>(code(random)),
                    static_cast<unsigned char>(code(random) / 2)});
         x = next_x;
@@ -96,12 +98,12 @@ TEST(LayerStore, BeginsAPathWhereFeatureOrLayerChanges) {
   LayerStore store(10'000);
   Stretch next = stretch(0.0, 0.0, 1.0, 0.0, 100, 50);
   store.add(next);
-  next.x0_mm = 1.0;
-  next.x1_mm = 2.0;
+  next.from_mm.x = 1.0;
+  next.to_mm.x = 2.0;
   next.feature = 2;
   store.add(next);
-  next.x0_mm = 2.0;
-  next.x1_mm = 3.0;
+  next.from_mm.x = 2.0;
+  next.to_mm.x = 3.0;
   next.layer = 2;
   next.line = 3;
   store.add(next);
@@ -213,10 +215,10 @@ TEST(LayerStore, KnowsWhereThePrintIsBesideAPurgeLine) {
   }
   std::vector<std::size_t> ends;
   const report::LayerPaths paths = store.encode(1, ends);
-  EXPECT_DOUBLE_EQ(paths.x_min_mm, 100.0);
-  EXPECT_DOUBLE_EQ(paths.x_max_mm, 140.0);
-  EXPECT_NEAR(paths.y_min_mm, 50.0, 0.2);
-  EXPECT_NEAR(paths.y_max_mm, 90.0, 0.2);
+  EXPECT_DOUBLE_EQ(paths.min_mm.x, 100.0);
+  EXPECT_DOUBLE_EQ(paths.max_mm.x, 140.0);
+  EXPECT_NEAR(paths.min_mm.y, 50.0, 0.2);
+  EXPECT_NEAR(paths.max_mm.y, 90.0, 0.2);
 }
 
 TEST(DeviationCode, IsLogarithmic) {

@@ -18,7 +18,7 @@ void play(MomentRing& ring, double& t, double until_s) {
     }
     verify::NozzleStep step;
     step.measured = true;
-    step.reference_x_mm = step.base_x.position = 100.0 * t;
+    step.reference_mm.x = step.base.x.position = 100.0 * t;
     step.nozzle.x.position = 100.0 * t + 1.0;
     step.contour2_mm2 = 0.25;
     const auto move = static_cast<std::size_t>(100.0 * t);
@@ -43,12 +43,12 @@ TEST(MomentRing, GivesWhatWasAroundAPlaceBothBehindAndAhead) {
     const std::vector<report::Moment>& moments = taken[0].moments;
     ASSERT_THAT(moments, SizeIs(151));
     EXPECT_EQ(moments[75].time_s, 0.0);
-    EXPECT_NEAR(moments[75].reference_x_mm, 70.25, 0.15);
+    EXPECT_NEAR(moments[75].reference_mm.x, 70.25, 0.15);
     EXPECT_NEAR(moments.front().time_s, -0.075, 0.01);
     EXPECT_NEAR(moments.back().time_s, 0.075, 0.01);
     EXPECT_EQ(moments[3].contour_mm, 0.5);
     for (const report::Moment& moment : moments) {
-      EXPECT_NEAR(moment.reference_x_mm, moments[75].reference_x_mm + 100.0 * moment.time_s, 0.02);
+      EXPECT_NEAR(moment.reference_mm.x, moments[75].reference_mm.x + 100.0 * moment.time_s, 0.02);
     }
     EXPECT_FALSE(ring.has_requests());
   }

@@ -216,7 +216,7 @@ TEST(Recorder, ShowsBothNozzlesAroundEachPlace) {
         const auto at = std::find_if(moments->begin(), moments->end(),
                                      [](const report::Moment& m) { return m.time_s == 0.0; });
         ASSERT_NE(at, moments->end());
-        EXPECT_LT(std::hypot(at->reference_x_mm, at->reference_y_mm), 0.3) << place.line;
+        EXPECT_LT(std::hypot(at->reference_mm.x, at->reference_mm.y), 0.3) << place.line;
         EXPECT_TRUE(
             std::is_sorted(moments->begin(), moments->end(),
                            [](const auto& a, const auto& b) { return a.time_s < b.time_s; }));

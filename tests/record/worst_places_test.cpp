@@ -14,8 +14,7 @@ using ::testing::IsEmpty;
 PlaceCandidate candidate(double contour_mm, double x_mm, double y_mm = 0.0) {
   PlaceCandidate result;
   result.contour2_mm2 = contour_mm * contour_mm;
-  result.x_mm = x_mm;
-  result.y_mm = y_mm;
+  result.xy_mm = {x_mm, y_mm};
   return result;
 }
 
@@ -63,7 +62,7 @@ TEST(WorstPlaces, FindsTheWorstOfManyWhateverTheirOrder) {
     }
     std::vector<double> found;
     for (const WorstPlaces::Kept& kept : worst.places()) {
-      found.push_back(kept.candidate.x_mm / 5.0);
+      found.push_back(kept.candidate.xy_mm.x / 5.0);
     }
     EXPECT_THAT(found, ElementsAre(499.0, 498.0, 497.0, 496.0, 495.0));
   }

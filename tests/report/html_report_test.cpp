@@ -26,7 +26,7 @@ Recording page_recording() {
   place.feature = 1;
   place.before_mm = 0.08;
   place.after_mm = 0.004;
-  place.before = {{-0.5, 0.25, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0}};
+  place.before = {{-0.5, 0.25, {1.0, 2.0}, {3.0, 4.0}, {5.0, 6.0}}};
   recording.worst_before = {place};
   recording.histogram = {{0.0, 1.0, 2.0}, {1e-3, 3.0, 4.0}};
   recording.frequency_errors = {-0.1, 0.0, 0.1};

@@ -27,14 +27,13 @@ inline Recording sample_recording() {
   place.line = 95;
   place.layer = 2;
   place.feature = 1;
-  place.x_mm = 20.04;
-  place.y_mm = 30.0;
+  place.xy_mm = {20.04, 30.0};
   place.before_mm = 0.8;
   recording.worst_before = {place};
   place.line = 41;
   place.layer = 1;
   place.feature = 0;
-  place.y_mm = -2.26;
+  place.xy_mm.y = -2.26;
   place.after_mm = 0.012;
   recording.worst_after = {place};
   recording.frequency_errors = {-0.05, 0.0, 0.05};

@@ -85,7 +85,7 @@ TEST(ShapedNozzle, IsTheNozzleOnTheShapedBase) {
     const auto plain_y = nozzle_on(axis, path_y, grid);
     const auto shaped_x = nozzle_on(axis, shaped(path_x, x), grid);
     const auto shaped_y = nozzle_on(axis, shaped(path_y, y), grid);
-    ShapedNozzle nozzle(x, y);
+    ShapedNozzle nozzle({x, y});
     std::size_t next = 0;
     for (std::size_t k = 0; k < grid.count; ++k) {
       nozzle.add(grid.at(k), {plain_x[k].motion(), plain_y[k].motion()});
@@ -101,7 +101,7 @@ TEST(ShapedNozzle, IsTheNozzleOnTheShapedBase) {
 }
 
 TEST(ShapedNozzle, WithoutPulsesIsTheNozzleItself) {
-  ShapedNozzle nozzle({}, {});
+  ShapedNozzle nozzle({});
   nozzle.add(0.0, {{1.0, 0.0}, {2.0, 5.0}});
   nozzle.add(0.1, {{1.0, 0.0}, {2.5, 5.0}});
   EXPECT_EQ(nozzle.lookahead_s(), 0.0);

@@ -215,8 +215,8 @@ TEST(NozzleFollower, AnExactShaperLeavesTheRunAfterItAtRest) {
   verify::Rules exact = rules();
   exact.fixed.shaper = {"zv", "zv", exact.nozzle.x.main().zeta, exact.nozzle.y.main().zeta};
   gcode::Shaper shaper;
-  shaper.freq_x_hz = 45.0;
-  shaper.freq_y_hz = 30.0;
+  shaper.freq_hz.x = 45.0;
+  shaper.freq_hz.y = 30.0;
   std::vector<Piece> pieces = pieces_of(text);
   const Piece run = pieces.back();
   pieces.pop_back();
@@ -242,7 +242,7 @@ TEST(NozzleFollower, AnExactShaperLeavesTheRunAfterItAtRest) {
 // after it is shaped. Before other lines the shaper stays off.
 TEST(NozzleFollower, TheShaperComesBackBeforeWhatMovesByItself) {
   gcode::Shaper shaper;
-  shaper.freq_x_hz = shaper.freq_y_hz = 40.0;
+  shaper.freq_hz.x = shaper.freq_hz.y = 40.0;
   const std::string text = "G90\nM83\nG1 X10 Y10 Z1 F6000\nG1 X20 E1\nM117 a\nM400\nG28\n";
   NozzleFollower follower(rules().nozzle, rules().fixed, shaper);
   double stops_s = 0.0;

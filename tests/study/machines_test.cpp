@@ -79,7 +79,7 @@ Machine machine_of(double known_hz) {
   const MachineAxis axis{"known.csv", "truth.csv", truth, shapers};
   Case of;
   of.axis = dynamics::FlexibleAxis(2.0 * std::numbers::pi * known_hz, 0.06);
-  Machine machine{"machine", axis, axis, corner_setup(of).unflex};
+  Machine machine{"machine", {axis, axis}, corner_setup(of).unflex};
   for (compensate::AxisSetup* const one : {&machine.unflex.x, &machine.unflex.y}) {
     one->limits.max_accel_mm_s2 = 20000.0;
   }

@@ -52,10 +52,10 @@ Printer printer_with(const machine::Settings& settings) {
   Printer printer{settings.printer.firmware,
                   {settings.retract_length_mm(), 0.0},
                   is_klipper ? klipper(settings) : others(settings)};
-  printer.limits["shaper X freq"] = printer.limits["shaper freq"] = settings.shaper_freq_x_hz();
-  const bool is_on = settings.shaper_freq_x_hz() > 0.0;
-  printer.limits["shaper type"] = shaper_type(is_on ? settings.shaper_type_x() : "none");
-  printer.limits["shaper Y freq"] = settings.shaper_freq_y_hz();
+  printer.limits["shaper X freq"] = printer.limits["shaper freq"] = settings.shaper_freq_hz().x;
+  const bool is_on = settings.shaper_freq_hz().x > 0.0;
+  printer.limits["shaper type"] = shaper_type(is_on ? settings.shaper_type().x : "none");
+  printer.limits["shaper Y freq"] = settings.shaper_freq_hz().y;
   return printer;
 }
 

@@ -136,26 +136,23 @@ class Form {
 };
 
 struct Task {
-  std::vector<Vector> vertices_mm;
+  std::vector<XY> vertices_mm;
   double accel_mm = 0.0;  // A
   double feed_mm = 0.0;   // F
   double tolerance_mm = 0.0;
 
   [[nodiscard]] std::size_t legs() const { return vertices_mm.size() - 1; }
   [[nodiscard]] double length_mm(std::size_t leg) const {
-    return std::hypot(vertices_mm[leg + 1].x - vertices_mm[leg].x,
-                      vertices_mm[leg + 1].y - vertices_mm[leg].y);
+    return distance(vertices_mm[leg], vertices_mm[leg + 1]);
   }
-  [[nodiscard]] Vector direction(std::size_t leg) const {
-    return {(vertices_mm[leg + 1].x - vertices_mm[leg].x) / length_mm(leg),
-            (vertices_mm[leg + 1].y - vertices_mm[leg].y) / length_mm(leg)};
+  [[nodiscard]] XY direction(std::size_t leg) const {
+    return (vertices_mm[leg + 1] - vertices_mm[leg]) / length_mm(leg);
   }
   // How many tolerances beyond the end of a leg the nozzle may be, as in fastest_motion().
   [[nodiscard]] double beyond(std::size_t vertex) const {
-    const Vector a = direction(vertex - 1);
-    const Vector b = direction(vertex);
-    const double sine = std::abs(a.x * b.y - a.y * b.x);
-    return a.x * b.x + a.y * b.y <= 0.0 ? 1.0 : 2.0 / std::max(sine, 0.1);
+    const XY a = direction(vertex - 1);
+    const XY b = direction(vertex);
+    return dot(a, b) <= 0.0 ? 1.0 : 2.0 / std::max(std::abs(cross(a, b)), 0.1);
   }
 };
 
@@ -300,12 +297,12 @@ class MotionProgram final : public nlp::Problem {
         variables_.lower[first + kA] = -task_.accel_mm;
         variables_.upper[first + kA] = task_.accel_mm;
         if (k == 0 || k + 1 == nodes_) {
-          const Vector& end = k == 0 ? task_.vertices_mm.front() : task_.vertices_mm.back();
+          const XY& end = k == 0 ? task_.vertices_mm.front() : task_.vertices_mm.back();
           for (int i = 0; i < kPerAxis; ++i) {
             if (i == kA) {
               continue;
             }
-            const double place = i == kP || i == kB ? (axis == 0 ? end.x : end.y) : 0.0;
+            const double place = i == kP || i == kB ? end[axis] : 0.0;
             variables_.lower[first + i] = variables_.upper[first + i] = place;
           }
         }
@@ -383,7 +380,7 @@ class MotionProgram final : public nlp::Problem {
             0.0, 0.0);
       }
     }
-    const Vector d = task_.direction(leg);
+    const XY d = task_.direction(leg);
     for (const int place : {0, 1, 2}) {
       const State& x = at[0][place];
       const State& y = at[1][place];
@@ -392,9 +389,9 @@ class MotionProgram final : public nlp::Problem {
       if (is_end || (place == 1 && !is_last)) {
         continue;
       }
-      add_strip(node, leg, x, y, {-d.y, d.x}, task_.vertices_mm[leg], task_.tolerance_mm, true);
+      add_strip(node, leg, x, y, turned_left(d), task_.vertices_mm[leg], task_.tolerance_mm, true);
       if (leg > 0) {
-        add_strip(node, leg, x, y, {-d.x, -d.y}, task_.vertices_mm[leg],
+        add_strip(node, leg, x, y, -d, task_.vertices_mm[leg],
                   task_.beyond(leg) * task_.tolerance_mm, false);
       }
       if (leg + 1 < task_.legs()) {
@@ -407,17 +404,15 @@ class MotionProgram final : public nlp::Problem {
       }
     }
     if (is_first && leg > 0) {
-      const Vector before = task_.direction(leg - 1);
-      const double length = std::hypot(before.x + d.x, before.y + d.y);
-      add_strip(node, leg, at[0][0], at[1][0],
-                {(before.x + d.x) / length, (before.y + d.y) / length}, task_.vertices_mm[leg],
+      const XY through = task_.direction(leg - 1) + d;
+      add_strip(node, leg, at[0][0], at[1][0], through / length(through), task_.vertices_mm[leg],
                 task_.tolerance_mm, true);
     }
   }
 
-  void add_strip(std::size_t node, std::size_t leg, const State& x, const State& y, Vector n,
-                 Vector place, double tolerance, bool is_strip) {
-    const double middle = (n.x * place.x + n.y * place.y) / tolerance;
+  void add_strip(std::size_t node, std::size_t leg, const State& x, const State& y, XY n, XY place,
+                 double tolerance, bool is_strip) {
+    const double middle = dot(n, place) / tolerance;
     add({"strip", node, leg, {(n.x / tolerance) * x[kP] + (n.y / tolerance) * y[kP]}},
         is_strip ? middle - 1.0 : -nlp::kNoBound, middle + 1.0);
   }
@@ -476,7 +471,7 @@ using Base = SectionMotion::Base;
 struct Played {
   double step_s = 0.0;
   std::vector<Base> base;
-  std::vector<Vector> accel_mm_s2;  // of the base, from here to the next
+  std::vector<XY> accel_mm_s2;  // of the base, from here to the next
   std::vector<dynamics::NozzleMotionXY> nozzle;
 };
 
@@ -486,19 +481,21 @@ Played play(const std::function<Base(double)>& base, double duration_s) {
   Played played;
   played.step_s = duration_s / static_cast<double>(steps);
   const Base start = base(0.0);
-  dynamics::NozzleXY nozzle{axis().riding(start.x.position_mm), axis().riding(start.y.position_mm)};
+  dynamics::NozzleXY nozzle = map_axes(
+      [](const SectionMotion::OfAxis& at) { return axis().riding(at.position_mm); }, start);
   for (std::size_t i = 0; i <= steps; ++i) {
     const Base now = base(static_cast<double>(i) * played.step_s);
     const Base next = base(static_cast<double>(std::min(i + 1, steps)) * played.step_s);
-    const double ax = (next.x.velocity_mm_s - now.x.velocity_mm_s) / played.step_s;
-    const double ay = (next.y.velocity_mm_s - now.y.velocity_mm_s) / played.step_s;
     played.base.push_back(now);
-    played.accel_mm_s2.push_back({ax, ay});
-    played.nozzle.push_back(nozzle.motion());
-    nozzle.x = dynamics::exact_step(axis(), nozzle.x, {now.x.position_mm, now.x.velocity_mm_s, ax},
-                                    played.step_s);
-    nozzle.y = dynamics::exact_step(axis(), nozzle.y, {now.y.position_mm, now.y.velocity_mm_s, ay},
-                                    played.step_s);
+    played.nozzle.push_back(dynamics::motion(nozzle));
+    for_each_axis(
+        [&](dynamics::NozzleState& state, double& accel, const SectionMotion::OfAxis& from,
+            const SectionMotion::OfAxis& to) {
+          accel = (to.velocity_mm_s - from.velocity_mm_s) / played.step_s;
+          state = dynamics::exact_step(axis(), state, {from.position_mm, from.velocity_mm_s, accel},
+                                       played.step_s);
+        },
+        nozzle, played.accel_mm_s2.emplace_back(), now, next);
   }
   return played;
 }
@@ -511,30 +508,34 @@ struct Largest {
   double left = 0.0;  // how far the nozzle is from the end, in tolerances
 };
 
+XY place_of(const dynamics::NozzleMotionXY& nozzle) {
+  return map_axes([](const dynamics::NozzleMotion& of_axis) { return of_axis.position; }, nozzle);
+}
+
 Largest largest(const Played& played, const Task& task) {
   Largest result;
-  const auto distance = [&](double x, double y) {
+  const auto distance_mm = [&](const XY& place_mm) {
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t leg = 0; leg < task.legs(); ++leg) {
-      const Vector d = task.direction(leg);
-      const Vector& start = task.vertices_mm[leg];
-      const double along =
-          std::clamp((x - start.x) * d.x + (y - start.y) * d.y, 0.0, task.length_mm(leg));
-      least = std::min(least, std::hypot(x - start.x - along * d.x, y - start.y - along * d.y));
+      const XY d = task.direction(leg);
+      const XY from_start = place_mm - task.vertices_mm[leg];
+      const double along = std::clamp(dot(from_start, d), 0.0, task.length_mm(leg));
+      least = std::min(least, length(from_start - along * d));
     }
     return least;
   };
   for (std::size_t i = 0; i < played.nozzle.size(); ++i) {
-    const auto& [x, y] = played.nozzle[i];
-    result.accel = std::max({result.accel, std::abs(played.accel_mm_s2[i].x) / kAccel_mm_s2,
-                             std::abs(played.accel_mm_s2[i].y) / kAccel_mm_s2});
-    result.error = std::max(result.error, distance(x.position, y.position) / kTolerance_mm);
-    result.feed = std::max(result.feed, std::hypot(x.velocity, y.velocity) / kFeed_mm_s);
+    for_each_axis(
+        [&](double accel) {
+          result.accel = std::max(result.accel, std::abs(accel) / kAccel_mm_s2);
+        },
+        played.accel_mm_s2[i]);
+    result.error = std::max(result.error, distance_mm(place_of(played.nozzle[i])) / kTolerance_mm);
+    const XY velocity =
+        map_axes([](const auto& of_axis) { return of_axis.velocity; }, played.nozzle[i]);
+    result.feed = std::max(result.feed, length(velocity) / kFeed_mm_s);
   }
-  const auto& [x, y] = played.nozzle.back();
-  result.left =
-      std::hypot(x.position - task.vertices_mm.back().x, y.position - task.vertices_mm.back().y) /
-      kTolerance_mm;
+  result.left = distance(task.vertices_mm.back(), place_of(played.nozzle.back())) / kTolerance_mm;
   return result;
 }
 
@@ -581,7 +582,7 @@ Nodes slowly(const Nodes& like, const Task& task) {
   Nodes nodes;
   nodes.intervals = like.intervals;
   for (std::size_t leg = 0; leg < task.legs(); ++leg) {
-    const Vector d = task.direction(leg);
+    const XY d = task.direction(leg);
     const double length = task.length_mm(leg);
     const double duration = length / (kShareOfFeed * task.feed_mm);
     const std::size_t count = like.intervals[leg];
@@ -595,8 +596,8 @@ Nodes slowly(const Nodes& like, const Task& task) {
       const double accel = length * 60.0 * s * (1.0 + s * (-3.0 + 2.0 * s)) / (duration * duration);
       Node& node = nodes.at.emplace_back();
       for (const int axis : {0, 1}) {
-        const double share = axis == 0 ? d.x : d.y;
-        const double from = axis == 0 ? task.vertices_mm[leg].x : task.vertices_mm[leg].y;
+        const double share = d[axis];
+        const double from = task.vertices_mm[leg][axis];
         double* const of_axis = &node[axis * kPerAxis];
         of_axis[kP] = of_axis[kB] = from + share * along;
         of_axis[kV] = of_axis[kW] = share * speed;

@@ -127,7 +127,7 @@ TEST(Optimal, RestsWhileMovesAreUpright) {
   EXPECT_NEAR(planner::duration_s(lifted->moves),
               planner::duration_s(level->moves) + 2.0 * std::sqrt(0.4 / 100.0), 1e-6);
   expect_base_at_rest(*lifted, moves, setup());
-  EXPECT_EQ(lifted->base->x_at(0.12).position_mm, 0.0);
+  EXPECT_EQ(lifted->base->at(0.12).x.position_mm, 0.0);
   EXPECT_LT(played(lifted->moves, *lifted->base, setup().x.axis).largest_error_mm,
             1.06 * kTolerance_mm);
 }

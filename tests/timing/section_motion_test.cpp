@@ -40,24 +40,17 @@ Section corner() { return section_along({{0.0, 0.0}, {10.0, 0.0}, {10.0, 10.0}},
 struct Followed {
   double error_mm = 0.0;
   double speed_mm_s = 0.0;
-  double accel_x_mm_s2 = 0.0;
-  double accel_y_mm_s2 = 0.0;
+  XY accel_mm_s2;
   double accel_motors_mm_s2 = 0.0;  // |ẍ| + |ÿ|
   double slip_mm_s = 0.0;           // between the speed that the base tells and that of its places
   double last_x_mm = 0.0;
 };
 
-struct Axes {
-  dynamics::FlexibleAxis x;
-  dynamics::FlexibleAxis y;
-};
+using BothAxes = Axes<dynamics::FlexibleAxis>;
 
-Axes axes(double factor = 1.0) {
-  const dynamics::FlexibleAxis axis = setup().x.axis.detuned(factor);
-  return {axis, axis};
-}
+BothAxes axes(double factor = 1.0) { return on_all_axes(setup().x.axis.detuned(factor)); }
 
-Followed follow(const Section& section, const SectionMotion& motion, const Axes& axes,
+Followed follow(const Section& section, const SectionMotion& motion, const BothAxes& axes,
                 dynamics::NozzleXY nozzle) {
   Followed result;
   const auto steps = static_cast<std::size_t>(std::ceil(motion.duration_s() / kSample_s));
@@ -72,22 +65,27 @@ Followed follow(const Section& section, const SectionMotion& motion, const Axes&
       return dynamics::BaseSegment{from.position_mm, from.velocity_mm_s,
                                    (to.velocity_mm_s - from.velocity_mm_s) / step_s};
     };
-    const dynamics::BaseSegment x = between(before.x, after.x);
-    const dynamics::BaseSegment y = between(before.y, after.y);
-    nozzle = {dynamics::rk4_step(axes.x, nozzle.x, x, step_s),
-              dynamics::rk4_step(axes.y, nozzle.y, y, step_s)};
+    const Axes<dynamics::BaseSegment> base = map_axes(between, before, after);
+    for_each_axis(
+        [&](dynamics::NozzleState& state, const dynamics::FlexibleAxis& axis,
+            const dynamics::BaseSegment& segment) {
+          state = dynamics::rk4_step(axis, state, segment, step_s);
+        },
+        nozzle, axes, base);
     double least_mm = std::numeric_limits<double>::infinity();
     for (const Leg& leg : section.legs) {
       least_mm =
           std::min(least_mm, distance_mm(leg.move, nozzle.x.position(), nozzle.y.position()));
     }
     result.error_mm = std::max(result.error_mm, least_mm);
-    result.speed_mm_s =
-        std::max(result.speed_mm_s, std::hypot(nozzle.x.velocity(), nozzle.y.velocity()));
-    result.accel_x_mm_s2 = std::max(result.accel_x_mm_s2, std::abs(x.acceleration));
-    result.accel_y_mm_s2 = std::max(result.accel_y_mm_s2, std::abs(y.acceleration));
-    result.accel_motors_mm_s2 =
-        std::max(result.accel_motors_mm_s2, std::abs(x.acceleration) + std::abs(y.acceleration));
+    const XY velocity =
+        map_axes([](const dynamics::NozzleState& state) { return state.velocity(); }, nozzle);
+    result.speed_mm_s = std::max(result.speed_mm_s, length(velocity));
+    const XY accel = map_axes(
+        [](const dynamics::BaseSegment& segment) { return std::abs(segment.acceleration); }, base);
+    for_each_axis([](double& most, double now) { most = std::max(most, now); }, result.accel_mm_s2,
+                  accel);
+    result.accel_motors_mm_s2 = std::max(result.accel_motors_mm_s2, taxicab(accel));
     before = after;
   }
   result.last_x_mm = nozzle.x.position();
@@ -95,7 +93,7 @@ Followed follow(const Section& section, const SectionMotion& motion, const Axes&
 }
 
 Followed follow(const Section& section, const SectionMotion& motion, double factor = 1.0) {
-  const Vector start = start_of(section.legs.front());
+  const XY start = start_of(section.legs.front());
   return follow(section, motion, axes(factor), {{start.x, 0.0}, {start.y, 0.0}});
 }
 
@@ -114,8 +112,8 @@ TEST(SectionMotion, KeepsTheRulesAroundACorner) {
   const Followed followed = follow(section, *motion);
   EXPECT_LT(followed.error_mm, 1.05 * kTolerance_mm);
   EXPECT_LT(followed.speed_mm_s, 1.02 * kFeed_mm_s);
-  EXPECT_LT(followed.accel_x_mm_s2, 1.03 * kMotors_mm_s2);
-  EXPECT_LT(followed.accel_y_mm_s2, 1.03 * kMotors_mm_s2);
+  EXPECT_LT(followed.accel_mm_s2.x, 1.03 * kMotors_mm_s2);
+  EXPECT_LT(followed.accel_mm_s2.y, 1.03 * kMotors_mm_s2);
   EXPECT_LT(followed.slip_mm_s, 0.1);
   EXPECT_GT(motion->duration_s(), length_mm(section) / kFeed_mm_s);
 }
@@ -127,7 +125,7 @@ TEST(SectionMotion, UsesWhatTheRulesAllow) {
   const Followed followed = follow(section, *motion);
   EXPECT_GT(followed.error_mm, 0.9 * kTolerance_mm);
   EXPECT_GT(followed.speed_mm_s, 0.98 * kFeed_mm_s);
-  EXPECT_GT(followed.accel_x_mm_s2, 0.9 * kMotors_mm_s2);
+  EXPECT_GT(followed.accel_mm_s2.x, 0.9 * kMotors_mm_s2);
   // Less than a plan that stops at the corner takes with a shaper of two pulses.
   const double half_period_s = 0.5 / setup().x.axis.main_hz();
   EXPECT_LT(motion->duration_s(),
@@ -183,7 +181,7 @@ TEST(SectionMotion, TakesItsTimeForABandOfFrequencies) {
   for (const double times : {2.0, 1.2}) {
     SectionRules of_band = rules();
     for (const double factor : {0.95, 1.05}) {
-      of_band.edges.push_back({axes(factor).x, axes(factor).y, factor - 1.0, factor - 1.0});
+      of_band.edges.push_back({axes(factor), on_all_axes(factor - 1.0)});
     }
     of_band.times_tolerance = times;
     const auto robust = fastest_motion(section, of_band);
@@ -200,19 +198,21 @@ TEST(SectionMotion, TakesItsTimeForABandOfFrequencies) {
 TEST(SectionMotion, LetsTheNozzlesOfABandSwingInTheEndByWhatTheyMay) {
   SectionRules of_band = rules();
   for (const double factor : {0.95, 1.05}) {
-    of_band.edges.push_back({axes(factor).x, axes(factor).y, factor - 1.0, factor - 1.0});
+    of_band.edges.push_back({axes(factor), on_all_axes(factor - 1.0)});
   }
   Section section = section_along({{0.0, 0.0}, {6.0, 8.0}}, 1.5 * kFeed_mm_s);
   const auto swing_mm = [&](const SectionMotion& motion) {
     const SectionMotion::Base base = motion.base(motion.duration_s());
     double largest = 0.0;
     for (std::size_t i = 0; i < of_band.edges.size(); ++i) {
-      const dynamics::FlexibleAxis& x = of_band.edges[i].x;
-      const dynamics::FlexibleAxis& y = of_band.edges[i].y;
-      const auto of_x = x.gap(motion.edge_nozzles()[i].x, x.riding(base.x.position_mm));
-      const auto of_y = y.gap(motion.edge_nozzles()[i].y, y.riding(base.y.position_mm));
-      largest = std::max(largest, std::hypot(std::hypot(of_x.place_mm, of_x.speed_mm),
-                                             std::hypot(of_y.place_mm, of_y.speed_mm)));
+      const XY swing = map_axes(
+          [](const dynamics::FlexibleAxis& axis, const dynamics::NozzleState& nozzle,
+             const SectionMotion::OfAxis& at) {
+            const auto gap = axis.gap(nozzle, axis.riding(at.position_mm));
+            return std::hypot(gap.place_mm, gap.speed_mm);
+          },
+          of_band.edges[i], motion.edge_nozzles()[i], base);
+      largest = std::max(largest, length(swing));
     }
     return largest;
   };
@@ -252,14 +252,14 @@ TEST(SectionMotion, KeepsTheBaseWhereItMayBe) {
   const double free_mm = farthest_mm(*free);
   ASSERT_GT(free_mm, 10.04);
   SectionRules walled = rules();
-  walled.limits_x.max_position_mm = 10.02;
+  walled.limits.x.max_position_mm = 10.02;
   const auto motion = fastest_motion(section, walled);
   ASSERT_TRUE(motion);
   EXPECT_LT(farthest_mm(*motion), 10.02);
   EXPECT_GE(motion->duration_s(), free->duration_s());
   const Followed followed = follow(section, *motion);
   EXPECT_LT(followed.error_mm, 1.05 * kTolerance_mm);
-  EXPECT_LT(followed.accel_x_mm_s2, 1.03 * kMotors_mm_s2);
+  EXPECT_LT(followed.accel_mm_s2.x, 1.03 * kMotors_mm_s2);
 }
 
 TEST(SectionMotion, SharesMotors) {
@@ -298,7 +298,7 @@ TEST(SectionMotion, BeginsWithANozzleThatSwings) {
   dynamics::NozzleXY swinging;
   swinging.x.parts[0] = {0.0, 2.0};
   swinging.y.parts[0] = {0.6 * kTolerance_mm, 1.0};
-  section.nozzle = swinging.motion();
+  section.nozzle = dynamics::motion(swinging);
   const auto motion = fastest_motion(section, rules());
   ASSERT_TRUE(motion);
   const SectionMotion::Base first = motion->base(0.0);
@@ -318,7 +318,11 @@ TEST(SectionMotion, IsOnThePathWhereItEndsEvenOnUnequalAxes) {
   ASSERT_EQ(parts->size(), 2U);
   SectionRules unequal = rules();
   unequal.y = {.omega_rad_s = 350.0, .zeta = 0.2};
-  const Axes both{{unequal.x.omega_rad_s, unequal.x.zeta}, {unequal.y.omega_rad_s, unequal.y.zeta}};
+  const BothAxes both = map_axes(
+      [](const dynamics::Mode& mode) {
+        return dynamics::FlexibleAxis(mode.omega_rad_s, mode.zeta);
+      },
+      unequal);
   const double even_mm_s = kFeed_mm_s * std::sqrt(0.5);
   const Section& first = parts->front().section;
   const auto to_even = fastest_motion(first, unequal);
@@ -332,7 +336,7 @@ TEST(SectionMotion, IsOnThePathWhereItEndsEvenOnUnequalAxes) {
   const auto from_even = fastest_motion(second, unequal);
   ASSERT_TRUE(from_even);
   const SectionMotion::Base begin = from_even->base(0.0);
-  const Vector start = start_of(second.legs[0]);
+  const XY start = start_of(second.legs[0]);
   EXPECT_NEAR(begin.x.position_mm, start.x, 1e-3);
   EXPECT_NEAR(begin.y.position_mm, start.y, 1e-3);
   const Followed followed =

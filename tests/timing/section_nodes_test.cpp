@@ -73,7 +73,7 @@ TEST(SectionNodes, TakeTheLegOfTheMomentAtACorner) {
   const Section section = section_along({{0.0, 0.0}, {10.0, 0.0}, {10.0, 10.0}}, 100.0);
   const SectionNodes nodes(section, kNode_s);
   const SectionNodes::Pin& pin = nodes.pins().front();
-  for (const Vector nozzle : {Vector{9.0, 0.1}, Vector{10.1, 1.0}}) {
+  for (const XY nozzle : {XY{9.0, 0.1}, XY{10.1, 1.0}}) {
     EXPECT_EQ(nodes.nearest_leg(pin.k - 1, 0.5, nozzle), 0U);
     EXPECT_EQ(nodes.nearest_leg(pin.k, pin.x - 1e-9, nozzle), 0U);
     EXPECT_EQ(nodes.nearest_leg(pin.k, pin.x + 1e-9, nozzle), 1U);

@@ -48,8 +48,8 @@ TEST(Sections, CutALongLineWhereItIsEven) {
   EXPECT_TRUE(first.section.ends_even);
   EXPECT_TRUE(second.section.starts_even);
   EXPECT_FALSE(second.section.ends_even);
-  EXPECT_NEAR(first.pause.x_mm_s, 60.0, 1e-9);
-  EXPECT_NEAR(first.pause.y_mm_s, 80.0, 1e-9);
+  EXPECT_NEAR(first.pause.velocity_mm_s.x, 60.0, 1e-9);
+  EXPECT_NEAR(first.pause.velocity_mm_s.y, 80.0, 1e-9);
   EXPECT_EQ(second.pause.duration_s, 0.0);
   const planner::PlannedMove& before = first.section.legs[0].move;
   const planner::PlannedMove& after = second.section.legs[0].move;
@@ -66,7 +66,7 @@ TEST(Sections, CutALongLineWhereItIsEven) {
   EXPECT_NEAR(after.start_v_mm_s, 100.0, 1e-9);
   EXPECT_NEAR(after.end_v_mm_s, 0.0, 1e-9);
   for (const gcode::Axis axis : {gcode::X, gcode::Y}) {
-    const double pause_mm_s = axis == gcode::X ? first.pause.x_mm_s : first.pause.y_mm_s;
+    const double pause_mm_s = first.pause.velocity_mm_s[axis];
     EXPECT_NEAR(before.segment.end_mm[axis] + pause_mm_s * first.pause.duration_s,
                 after.segment.start_mm[axis], 1e-9);
   }
@@ -96,8 +96,8 @@ TEST(Sections, HaveAPauseWhereAMoveIsUpright) {
   ASSERT_TRUE(parts.has_value());
   ASSERT_EQ(parts->size(), 2U);
   EXPECT_NEAR(parts->front().pause.duration_s, 2.0 * lift_s, 1e-12);
-  EXPECT_EQ(parts->front().pause.x_mm_s, 0.0);
-  EXPECT_EQ(parts->front().pause.y_mm_s, 0.0);
+  EXPECT_EQ(parts->front().pause.velocity_mm_s.x, 0.0);
+  EXPECT_EQ(parts->front().pause.velocity_mm_s.y, 0.0);
   for (const SectionedPart& part : *parts) {
     ASSERT_EQ(part.section.legs.size(), 1U);
     EXPECT_FALSE(part.section.starts_even);
@@ -227,7 +227,7 @@ TEST(Sections, CoverThePathWithoutGaps) {
         EXPECT_GT(leg.to_mm, leg.from_mm);
         at_mm = leg.to_mm;
       }
-      even_mm_s = std::hypot(part.pause.x_mm_s, part.pause.y_mm_s);
+      even_mm_s = length(part.pause.velocity_mm_s);
       EXPECT_EQ(part.section.ends_even, even_mm_s > 0.0);
       has_even_pause = has_even_pause || even_mm_s > 0.0;
       at_mm += even_mm_s * part.pause.duration_s;

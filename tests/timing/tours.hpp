@@ -136,15 +136,7 @@ inline Drawn draw(const Moves& moves, const compensate::Setup& of,
   std::vector<compensate::RunWindow> windows =
       compensate::windows(moves, spans, compensate::testing::at_rest(moves), of);
   const auto engine = compensate::make_banded_engine();
-  std::array<std::vector<dynamics::AxisTrajectory>, 2> solved;
-  for (std::size_t i = 0; i < spans.size(); ++i) {
-    compensate::AxisSolutions solutions = compensate::solve(*engine, spans[i], windows[i]);
-    solved[0].push_back(solutions[0]->base);
-    solved[1].push_back(solutions[1]->base);
-  }
-  const dynamics::BaseTrajectory base = {of.period_s, compensate::join(spans, solved[0]),
-                                         compensate::join(spans, solved[1])};
-  return played(moves, base, axis);
+  return played(moves, *compensate::solve_all(*engine, spans, windows), axis);
 }
 
 // A move in Z alone, as a planner has it between two others.

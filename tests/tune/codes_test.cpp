@@ -41,8 +41,8 @@ TEST(Codes, OfAPrintAreWhatStandsAroundItsLayers) {
             "M190 S60\nG28\nM82\nG1 Z0.3 F600\nG1 X0 Y-3 F3000\nG1 X60 Y-3 E9 F1000\nG92 E0\n");
   // No move of the end code: it was made for another height.
   EXPECT_EQ(codes->end, "G28 X\nM104 S0\nEND_PRINT\n");
-  EXPECT_DOUBLE_EQ(codes->center_x_mm, 110.0);
-  EXPECT_DOUBLE_EQ(codes->center_y_mm, 95.0);
+  EXPECT_DOUBLE_EQ(codes->center_mm.x, 110.0);
+  EXPECT_DOUBLE_EQ(codes->center_mm.y, 95.0);
 }
 
 TEST(Codes, OfAPrintWithoutMarksStandAroundItsExtrusion) {

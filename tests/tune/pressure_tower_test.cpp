@@ -103,7 +103,7 @@ TEST(PressureTower, TellsWhatItIs) {
   EXPECT_EQ(record->trial.bands, built.bands.size());
   EXPECT_EQ(record->codes.start, settings().codes.start);
   EXPECT_EQ(record->codes.end, settings().codes.end);
-  EXPECT_EQ(record->codes.center_x_mm, 110.0);
+  EXPECT_EQ(record->codes.center_mm.x, 110.0);
   EXPECT_FALSE(is_pressure_tower(tower(TowerSettings{}).start));
   EXPECT_FALSE(pressure_record_of(tower(TowerSettings{}).start, "t.gcode"));
   EXPECT_FALSE(record_of(built.start, "t.gcode"));

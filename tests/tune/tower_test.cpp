@@ -50,8 +50,8 @@ TEST(Tower, BeginsAndEndsEachBandAtOnePlace) {
     const auto segments =
         segments_of(built.start + built.approach(number) + built.bands[number - 1]);
     const gcode::Position& end = segments.back().end_mm;
-    EXPECT_NEAR(end[gcode::X], built.begin_x_mm, 1e-3);
-    EXPECT_NEAR(end[gcode::Y], built.begin_y_mm, 1e-3);
+    EXPECT_NEAR(end[gcode::X], built.begin_mm.x, 1e-3);
+    EXPECT_NEAR(end[gcode::Y], built.begin_mm.y, 1e-3);
     EXPECT_NEAR(end[gcode::Z], built.bottoms_mm[number], 1e-9);
   }
 }
@@ -161,8 +161,8 @@ TEST(Tower, TellsWhatItIs) {
   ASSERT_TRUE(record);
   EXPECT_EQ(record->codes.start, wanted.codes.start);
   EXPECT_EQ(record->codes.end, wanted.codes.end);
-  EXPECT_DOUBLE_EQ(record->codes.center_x_mm, 110.0);
-  EXPECT_DOUBLE_EQ(record->codes.center_y_mm, 100.0);
+  EXPECT_DOUBLE_EQ(record->codes.center_mm.x, 110.0);
+  EXPECT_DOUBLE_EQ(record->codes.center_mm.y, 100.0);
   EXPECT_EQ(record->trials[0].bands, wanted.trials[0].bands);
   EXPECT_EQ(record->trials[1].known.rounds, 2U);
 }

@@ -77,7 +77,7 @@ TEST(Bundle, StepsAsRungeAndKuttaDo) {
       Bundle bundle({model});
       bundle.set_nozzle(0, start);
       bundle.begin_steps(steps, h);
-      bundle.step(x, y);
+      bundle.step({x, y});
       const NozzleXY found = bundle.nozzle();
       ASSERT_NEAR(found.x.position(), wanted.x.position(), 1e-12);
       ASSERT_NEAR(found.x.velocity(), wanted.x.velocity(), 1e-9);
@@ -105,7 +105,7 @@ TEST(Bundle, MovesNozzlesAsOneByOne) {
         dynamics::BaseSegment y{50.0, -30.0, 2000.0};
         bundle.begin_steps(steps, kStep_s);
         for (double step = 0.0; step < steps; ++step) {
-          bundle.step(x, y);
+          bundle.step({x, y});
           for (std::size_t i = 0; i < count; ++i) {
             alone[i].x = dynamics::exact_step(models[i].x, alone[i].x, x, kStep_s);
             alone[i].y = dynamics::exact_step(models[i].y, alone[i].y, y, kStep_s);
@@ -146,8 +146,8 @@ TEST(Bundle, FindsEachNozzlesDistanceFromThePath) {
     bundle.look(path, near, 0.0);
     for (std::size_t i = 0; i < models.size(); ++i) {
       std::size_t nearest = 0;
-      EXPECT_DOUBLE_EQ(bundle.now_mm2(i), near.squared_contour_error(path, places[i].first,
-                                                                     places[i].second, nearest));
+      EXPECT_DOUBLE_EQ(bundle.now_mm2(i), near.squared_contour_error(
+                                              path, {places[i].first, places[i].second}, nearest));
       if (i == 0) {
         EXPECT_EQ(bundle.nearest(), nearest);
       }
@@ -238,7 +238,7 @@ TEST(Bundle, IsTheSameInRegistersOfTwoNumbersAndOfFour) {
       x.acceleration = uniform(random);
       y.acceleration = uniform(random);
       bundle.begin_steps(i % 2 == 0 ? 1.0 : 10.0, kStep_s);
-      bundle.step(x, y);
+      bundle.step({x, y});
       near.slide(path, i * kStep_s);
       bundle.look(path, near, i > 0 ? kStep_s : 0.0);
       bundle.count(true, i % 7 != 0);

@@ -49,13 +49,13 @@ void round_the_corner(CornerGauge& gauge, double radius_mm) {
   for (double way_mm = 0.0; way_mm < 20.0; way_mm += 0.01) {
     const double beyond_mm = way_mm - begin_mm;
     if (beyond_mm <= 0.0) {
-      gauge.sample(0.01 * way_mm, way_mm, 0.0);
+      gauge.sample(0.01 * way_mm, {way_mm, 0.0});
     } else if (beyond_mm < length_mm) {
       const double angle = beyond_mm / radius_mm;
-      gauge.sample(0.01 * way_mm, begin_mm + radius_mm * std::sin(angle),
-                   radius_mm * (1.0 - std::cos(angle)));
+      gauge.sample(0.01 * way_mm,
+                   {begin_mm + radius_mm * std::sin(angle), radius_mm * (1.0 - std::cos(angle))});
     } else {
-      gauge.sample(0.01 * way_mm, 10.0, radius_mm + beyond_mm - length_mm);
+      gauge.sample(0.01 * way_mm, {10.0, radius_mm + beyond_mm - length_mm});
     }
   }
 }
@@ -89,7 +89,7 @@ TEST(CornerGauge, MeasuresHowFarAnArcPassesFromTheCorner) {
 TEST(CornerGauge, FindsNoDistanceOnThePath) {
   CornerGauge gauge = gauge_on(bent_by(90.0));
   for (int i = 0; i <= 200; ++i) {
-    gauge.sample(1e-3 * i, std::min(0.1 * i, 10.0), std::max(0.1 * i - 10.0, 0.0));
+    gauge.sample(1e-3 * i, {std::min(0.1 * i, 10.0), std::max(0.1 * i - 10.0, 0.0)});
   }
   EXPECT_EQ(gauge.stats().count, 1U);
   EXPECT_NEAR(gauge.stats().max_mm, 0.0, 1e-12);
@@ -97,26 +97,26 @@ TEST(CornerGauge, FindsNoDistanceOnThePath) {
 
 TEST(CornerGauge, LooksBetweenTheSamples) {
   CornerGauge gauge = gauge_on(bent_by(90.0));
-  gauge.sample(0.095, 9.0, 0.3);
-  gauge.sample(0.105, 11.0, 0.3);
+  gauge.sample(0.095, {9.0, 0.3});
+  gauge.sample(0.105, {11.0, 0.3});
   EXPECT_DOUBLE_EQ(gauge.stats().max_mm, 0.3);
   CornerGauge lifted = gauge_on(bent_by(90.0));
-  lifted.sample(0.095, 9.6, 0.3);
+  lifted.sample(0.095, {9.6, 0.3});
   lifted.lift();
-  lifted.sample(0.105, 11.0, 0.3);
+  lifted.sample(0.105, {11.0, 0.3});
   EXPECT_DOUBLE_EQ(lifted.stats().max_mm, 0.5);
 }
 
 TEST(CornerGauge, LooksOnlyNearTheTimeOfTheCorner) {
   CornerGauge gauge = gauge_on(bent_by(90.0));
-  gauge.sample(0.06, 10.0, 0.0);
-  gauge.sample(0.08, 9.0, 0.0);
-  gauge.sample(0.12, 10.0, 1.0);
-  gauge.sample(0.14, 10.0, 0.0);
+  gauge.sample(0.06, {10.0, 0.0});
+  gauge.sample(0.08, {9.0, 0.0});
+  gauge.sample(0.12, {10.0, 1.0});
+  gauge.sample(0.14, {10.0, 0.0});
   EXPECT_NEAR(gauge.stats().max_mm, std::sqrt(0.5), 1e-12);
   CornerGauge unseen = gauge_on(bent_by(90.0));
-  unseen.sample(0.01, 1.0, 0.0);
-  unseen.sample(0.19, 10.0, 9.0);
+  unseen.sample(0.01, {1.0, 0.0});
+  unseen.sample(0.19, {10.0, 9.0});
   EXPECT_EQ(unseen.stats().count, 0U);
 }
 
@@ -124,17 +124,17 @@ TEST(CornerGauge, LooksOnlyNearTheTimeOfTheCorner) {
 TEST(CornerGauge, CountsNoCornerThatItMissed) {
   CornerGauge missing = gauge_on(bent_by(90.0));
   for (double time_s = 0.0; time_s < 0.095; time_s += 1e-3) {
-    missing.sample(time_s, 100.0 * time_s, 0.0);
+    missing.sample(time_s, {100.0 * time_s, 0.0});
   }
   missing.miss(0.095);
   missing.miss(0.11);
-  missing.sample(0.2, 10.0, 10.0);
+  missing.sample(0.2, {10.0, 10.0});
   EXPECT_EQ(missing.stats().count, 0U);
   // Not to look far from a corner costs nothing.
   CornerGauge seeing = gauge_on(bent_by(90.0));
   seeing.miss(0.05);
   for (double time_s = 0.06; time_s < 0.2; time_s += 1e-3) {
-    seeing.sample(time_s, std::min(100.0 * time_s, 10.0), std::max(0.0, 100.0 * time_s - 10.0));
+    seeing.sample(time_s, {std::min(100.0 * time_s, 10.0), std::max(0.0, 100.0 * time_s - 10.0)});
   }
   seeing.miss(0.2);
   EXPECT_EQ(seeing.stats().count, 1U);
@@ -145,7 +145,7 @@ TEST(CornerGauge, TakesOnlySharpTurnsForCorners) {
        {std::pair{15.0, 0U}, std::pair{19.9, 0U}, std::pair{20.1, 1U}, std::pair{-25.0, 1U},
         std::pair{180.0, 1U}}) {
     CornerGauge gauge = gauge_on(bent_by(degrees));
-    gauge.sample(0.1, 10.0, 0.0);
+    gauge.sample(0.1, {10.0, 0.0});
     EXPECT_EQ(gauge.stats().count, corners) << degrees;
   }
 }
@@ -158,7 +158,7 @@ TEST(CornerGauge, SeesNoCornerInADenseCurve) {
   }
   CornerGauge gauge = gauge_on(circle);
   for (int i = 0; i < 1000; ++i) {
-    gauge.sample(1e-3 * i, 10.0, 0.0);
+    gauge.sample(1e-3 * i, {10.0, 0.0});
   }
   EXPECT_EQ(gauge.stats().count, 0U);
 }
@@ -167,12 +167,12 @@ TEST(CornerGauge, TakesATravelForNoPartOfACorner) {
   std::vector<Point> points = bent_by(90.0);
   points[2].filament_mm = 0.0;
   CornerGauge before_travel = gauge_on(points);
-  before_travel.sample(0.1, 10.0, 0.0);
+  before_travel.sample(0.1, {10.0, 0.0});
   EXPECT_EQ(before_travel.stats().count, 0U);
   points = bent_by(90.0);
   points[1].filament_mm = 0.0;
   CornerGauge behind_travel = gauge_on(points);
-  behind_travel.sample(0.1, 10.0, 0.0);
+  behind_travel.sample(0.1, {10.0, 0.0});
   EXPECT_EQ(behind_travel.stats().count, 0U);
 }
 

@@ -197,7 +197,7 @@ TEST(Measure, AShiftedBaseIsOffByTheShift) {
   const DeviationStats stats = run.all.stats();
   EXPECT_NEAR(stats.contour_max_mm, 0.25, 1e-7);
   EXPECT_NEAR(stats.contour_rms_mm, 0.25, 1e-9);
-  EXPECT_NEAR(run.base_end_y_mm, 0.25, 1e-12);
+  EXPECT_NEAR(run.base_end_mm.y, 0.25, 1e-12);
 }
 
 TEST(Measure, IsTheSameAnywhereOnTheBed) {
@@ -242,7 +242,7 @@ TEST(Measure, ATailCountsInNeither) {
   const RunDeviation without = measure(moves, moves, at_rest(moves), {});
   EXPECT_NEAR(with.all.stats().duration_s, duration_s(moves), 1e-9);
   EXPECT_NEAR(with.all.stats().contour_rms_mm, without.all.stats().contour_rms_mm, 1e-12);
-  EXPECT_DOUBLE_EQ(with.base_end_x_mm, 25.0);
+  EXPECT_DOUBLE_EQ(with.base_end_mm.x, 25.0);
 }
 
 TEST(Measure, ABaseThatEndsEarlyRestsWhileTheReferenceGoesOn) {

@@ -31,9 +31,8 @@ class Lag : public ::testing::Test {
                 double laid_mm, bool flows = true) {
     const PathPiece& on = path_[piece];
     FilamentLag lag;
-    const PathPlace nozzle =
-        nearest_place(path_, piece, on.x_mm + reference_mm * on.direction_x,
-                      on.y_mm + reference_mm * on.direction_y, nozzle_x_mm, nozzle_y_mm);
+    const PathPlace nozzle = nearest_place(path_, piece, on.start_mm + reference_mm * on.direction,
+                                           {nozzle_x_mm, nozzle_y_mm});
     lag.add(path_, nozzle, laid_mm, flows, 1e-4);
     return lag.stats().max_mm;
   }

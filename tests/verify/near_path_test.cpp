@@ -26,16 +26,16 @@ TEST(NearPath, MeasuresTheDistanceToThePathNearTheTime) {
   std::size_t nearest = 99;
   // Half way along the first move. The way back would be nearer, but is out of reach in time.
   near.slide(path, 0.25);
-  EXPECT_NEAR(std::sqrt(near.squared_contour_error(path, 25.0, 0.8, nearest)), 0.8, 1e-9);
+  EXPECT_NEAR(std::sqrt(near.squared_contour_error(path, {25.0, 0.8}, nearest)), 0.8, 1e-9);
   EXPECT_EQ(nearest, 0U);
   // The path counts no further than its reach in time, 3 mm ahead.
-  EXPECT_NEAR(std::sqrt(near.squared_contour_error(path, 35.0, 0.0, nearest)), 7.0, 0.1);
+  EXPECT_NEAR(std::sqrt(near.squared_contour_error(path, {35.0, 0.0}, nearest)), 7.0, 0.1);
   // At the turn all three pieces are near.
   near.slide(path, 0.505);
-  EXPECT_NEAR(std::sqrt(near.squared_contour_error(path, 49.0, 0.9, nearest)), 0.1, 1e-9);
+  EXPECT_NEAR(std::sqrt(near.squared_contour_error(path, {49.0, 0.9}, nearest)), 0.1, 1e-9);
   EXPECT_EQ(nearest, 2U);
   near.slide(path, 0.75);
-  EXPECT_NEAR(std::sqrt(near.squared_contour_error(path, 26.0, 0.2, nearest)), 0.8, 1e-9);
+  EXPECT_NEAR(std::sqrt(near.squared_contour_error(path, {26.0, 0.2}, nearest)), 0.8, 1e-9);
   EXPECT_EQ(nearest, 2U);
 }
 

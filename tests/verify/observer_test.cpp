@@ -36,9 +36,7 @@ class Sums final : public Observer {
       EXPECT_GE(step.time_s, piece.start_s - 1e-9);
       EXPECT_LE(step.time_s, piece.end_s + 1e-9);
       // The reference is on its piece.
-      const double x = step.reference_x_mm - piece.x_mm;
-      const double y = step.reference_y_mm - piece.y_mm;
-      EXPECT_NEAR(x * piece.direction_y - y * piece.direction_x, 0.0, 1e-9);
+      EXPECT_NEAR(cross(step.reference_mm - piece.start_mm, piece.direction), 0.0, 1e-9);
     }
   }
   void hold(double duration_s) override { held_s += duration_s; }

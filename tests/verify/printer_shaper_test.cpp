@@ -28,14 +28,12 @@ constexpr char kCorners[] =
     "G1 E1 F1800\nG1 X70 Y60 E1.5 F4800\nM400\nG1 X70 Y20 E1.2\nG4 P200\nG1 X20 Y20 E1.2\n"
     "PRINT_END\n";
 
-Rules rules_with(const std::string& type_x, double freq_x_hz, const std::string& type_y,
-                 double freq_y_hz) {
+Rules rules_with(const std::string& x_type, double x_hz, const std::string& y_type, double y_hz) {
   Rules rules;
   rules.nozzle.x = rules.nozzle.y = {kOmega_rad_s, kZeta};
   rules.nozzle.step_s = 1e-4;
-  rules.fixed.shaper = {type_x, type_y, 0.1, 0.1};
-  rules.interpreter.shaper_freq_x_hz = freq_x_hz;
-  rules.interpreter.shaper_freq_y_hz = freq_y_hz;
+  rules.fixed.shaper = {{x_type, y_type}, {0.1, 0.1}};
+  rules.interpreter.shaper_freq_hz = {x_hz, y_hz};
   return rules;
 }
 
@@ -63,8 +61,7 @@ class Middle final : public Observer {
       ++found.steps;
       found.contour_mm = std::max(found.contour_mm, std::sqrt(step.contour2_mm2));
       found.tracking_mm =
-          std::max(found.tracking_mm, std::hypot(step.nozzle.x.position - step.reference_x_mm,
-                                                 step.nozzle.y.position - step.reference_y_mm));
+          std::max(found.tracking_mm, distance(step.reference_mm, dynamics::place_mm(step.nozzle)));
     }
   }
   void hold(double /*duration_s*/) override {}

@@ -93,7 +93,7 @@ double at(const dynamics::BaseSegment& base, double h) {
 }
 
 TEST_P(Shaped, IsTheWeightedSumOfShiftedMotions) {
-  ShapedBase base(shaping_, 20.0, 30.0);
+  ShapedBase base(shaping_, {20.0, 30.0});
   std::vector<BasePhase> phases;
   double given_s = 0.0;
   for (const PlannedMove& move : moves_) {
@@ -120,22 +120,24 @@ TEST_P(Shaped, IsTheWeightedSumOfShiftedMotions) {
     begins = begins || std::abs(t) < 1e-9;
     for (const double share : {0.0, 0.3, 1.0}) {
       const double h = share * phase.duration_s;
-      EXPECT_NEAR(at(phase.x, h), convolved(t + h, shaping_.x, gcode::X), 1e-8) << t + h;
-      EXPECT_NEAR(at(phase.y, h), convolved(t + h, shaping_.y, gcode::Y), 1e-8) << t + h;
+      EXPECT_NEAR(at(phase.xy.x, h), convolved(t + h, shaping_.x, gcode::X), 1e-8) << t + h;
+      EXPECT_NEAR(at(phase.xy.y, h), convolved(t + h, shaping_.y, gcode::Y), 1e-8) << t + h;
     }
     t += phase.duration_s;
   }
   EXPECT_TRUE(begins) << "a phase begins where the plan does";
   EXPECT_NEAR(t + base.lead_s(), given_s + memory_s(), 1e-9);
-  EXPECT_NEAR(at(phases.back().x, phases.back().duration_s), moves_.back().segment.end_mm[0], 1e-8);
-  EXPECT_NEAR(at(phases.back().y, phases.back().duration_s), moves_.back().segment.end_mm[1], 1e-8);
+  EXPECT_NEAR(at(phases.back().xy.x, phases.back().duration_s), moves_.back().segment.end_mm[0],
+              1e-8);
+  EXPECT_NEAR(at(phases.back().xy.y, phases.back().duration_s), moves_.back().segment.end_mm[1],
+              1e-8);
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, Shaped, ::testing::Range(1, 9));
 
 TEST(ShapedBase, WithoutPulsesIsThePlan) {
   const PlannedMove move = move_to(1.0, 2.0, 31.0, 2.0, 3000.0, 120.0);
-  ShapedBase base({}, 1.0, 2.0);
+  ShapedBase base({}, {1.0, 2.0});
   std::vector<BasePhase> shaped;
   base.add(move, shaped);
   base.finish(shaped, shaped);
@@ -144,8 +146,8 @@ TEST(ShapedBase, WithoutPulsesIsThePlan) {
   ASSERT_EQ(shaped.size(), planned.size());
   for (std::size_t i = 0; i < shaped.size(); ++i) {
     EXPECT_NEAR(shaped[i].duration_s, planned[i].duration_s, 1e-9);
-    EXPECT_NEAR(shaped[i].x.position, planned[i].x.position, 1e-9);
-    EXPECT_NEAR(shaped[i].x.velocity, planned[i].x.velocity, 1e-6);
+    EXPECT_NEAR(shaped[i].xy.x.position, planned[i].xy.x.position, 1e-9);
+    EXPECT_NEAR(shaped[i].xy.x.velocity, planned[i].xy.x.velocity, 1e-6);
   }
 }
 
@@ -154,7 +156,7 @@ TEST(ShapedBase, DoesNotShapeFilament) {
   move.segment.end_mm[gcode::E] = 1.5;
   planner::Shaping shaping;
   shaping.x = *dynamics::shaper_pulses(dynamics::ShaperKind::ei, 45.0, 0.1);
-  ShapedBase base(shaping, 1.0, 2.0);
+  ShapedBase base(shaping, {1.0, 2.0});
   std::vector<BasePhase> phases;
   base.add(move, phases);
   std::vector<BasePhase> behind;

@@ -68,7 +68,7 @@ std::pair<std::size_t, std::size_t> short_line(const std::string& text, int n) {
 
 Rules on_a_bed() {
   Rules rules;
-  rules.travel = {0.0, 100.0, 0.0, 100.0};
+  rules.travel = on_all_axes(TravelRange{0.0, 100.0});
   return rules;
 }
 
@@ -268,7 +268,7 @@ TEST_F(Emitted, APlaceOutOfTheTravelIsFound) {
 
 TEST_F(Emitted, APlaceOutOfTheTravelIsAllowedWhereTheSlicedFileGoesThere) {
   Rules rules = on_a_bed();
-  rules.travel.y_max_mm = 45.0;
+  rules.travel.y.max_mm = 45.0;
   EXPECT_EQ(violations_of(verify_text(kPrint, good_, rules)), "");
 }
 
@@ -432,7 +432,7 @@ class Shaped : public Emitted {
  protected:
   static VerifyReport check_shaped(const std::string& output) {
     Rules rules = on_a_bed();
-    rules.interpreter.shaper_freq_x_hz = 45.0;
+    rules.interpreter.shaper_freq_hz.x = 45.0;
     return verify_text(kPrint, output, rules);
   }
   // The good text with the shaper switched off before the first run, and with the line `restored`
@@ -454,7 +454,7 @@ TEST_F(Shaped, MustBeOffAgainBehindAMacro) {
   const std::string output = PlainEmitter().emit(print);
   const std::string off = "SET_INPUT_SHAPER SHAPER_FREQ_X=0 SHAPER_FREQ_Y=0\n";
   Rules rules = on_a_bed();
-  rules.interpreter.shaper_unknown_x = rules.interpreter.shaper_unknown_y = true;
+  rules.interpreter.shaper_unknown.x = rules.interpreter.shaper_unknown.y = true;
   const auto with_off = [&](bool behind_macro) {
     std::string text = output;
     text.insert(text.find(";unflex run\n"), off);

@@ -9,6 +9,7 @@
 #include <span>
 #include <string_view>
 
+#include "unflex/core/axes.hpp"
 #include "unflex/core/firmware.hpp"
 
 namespace unflex {
@@ -55,11 +56,16 @@ class Motors {
   [[nodiscard]] double of(std::size_t i, double x, double y, double z) const {
     return rows_[i][0] * x + rows_[i][1] * y + rows_[i][2] * z;
   }
+  // axes: X, Y, Z and any further ones.
+  template <std::size_t kAxes>
+  [[nodiscard]] double of(std::size_t i, const std::array<double, kAxes>& axes) const {
+    return of(i, axes[0], axes[1], axes[2]);
+  }
   // Where the axes are when the motors are at q.
   [[nodiscard]] std::array<double, kCount> axes(const std::array<double, kCount>& q) const;
 
   // The largest magnitude of what a motor of X or Y does when the axes do x, y, z.
-  [[nodiscard]] double largest_of_xy(double x, double y, double z) const;
+  [[nodiscard]] double largest_of_xy(const Axes<double>& xy, double z = 0.0) const;
   // The uncertainty of motor i if that of every axis is 1.
   [[nodiscard]] double uncertainty(std::size_t i) const {
     return std::abs(rows_[i][0]) + std::abs(rows_[i][1]) + std::abs(rows_[i][2]);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "unflex/container/container.hpp"
+#include "unflex/core/axes.hpp"
 #include "unflex/core/byte_stream.hpp"
 #include "unflex/core/error.hpp"
 #include "unflex/core/progress.hpp"
@@ -85,7 +86,8 @@ struct Inspection {
   double moving_time_s = 0.0;
   double filament_mm = 0.0;
   double path_length_mm = 0.0;
-  double x_min_mm = 0.0, x_max_mm = 0.0, y_min_mm = 0.0, y_max_mm = 0.0, z_max_mm = 0.0;
+  Axes<double> min_mm, max_mm;
+  double z_max_mm = 0.0;
   bool absolute_e = false;                                     // M82 in force for most extrusions
   double lowest_accel_mm_s2 = 0.0, highest_accel_mm_s2 = 0.0;  // in force during moves
   report::StepRates step_rates;                                // without emitted lines

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "unflex/core/axes.hpp"
 #include "unflex/core/error.hpp"
 #include "unflex/core/firmware.hpp"
 #include "unflex/core/kinematics.hpp"
@@ -38,8 +39,7 @@ struct PrinterSettings {
   std::string version;             // as the firmware tells it; empty: not known
   std::string transport = "auto";  // how lines reach the firmware: "card", "serial", "sbc"
   // Where the base may be. Unset: not limited, except that it stays above 0 where the path does.
-  std::optional<Range> travel_x_mm;
-  std::optional<Range> travel_y_mm;
+  Axes<std::optional<Range>> travel_mm;
   bool relative_extrusion = false;  // the printer is in M83 when a print begins
   // [firmware_retraction] is configured; lengths as in the printer's configuration.
   bool firmware_retraction = true;
@@ -76,16 +76,13 @@ struct PrinterSettings {
   // Frequencies the printer's own [input_shaper] is set back to after the print (its type stays).
   // 0: the printer has none. Unset: not known on Klipper, where every printer may have one;
   // elsewhere none.
-  std::optional<double> input_shaper_freq_x_hz;
-  std::optional<double> input_shaper_freq_y_hz;
+  Axes<std::optional<double>> input_shaper_freq_hz;
   // The type of the shaper as the firmware spells it; "auto": what the firmware takes if it is told
   // none. RepRapFirmware forgets the type when its shaper is switched off (M593 P). Klipper may
   // have another type along Y.
-  std::string input_shaper_type = "auto";
-  std::string input_shaper_type_y = "auto";  // "auto": as along X
+  Axes<std::string> input_shaper_type{"auto", "auto"};  // Y "auto": as along X
   // Unset: the firmware's default.
-  std::optional<double> input_shaper_damping_ratio_x;
-  std::optional<double> input_shaper_damping_ratio_y;
+  Axes<std::optional<double>> input_shaper_damping_ratio;
 };
 
 // Steps per second that the printer's board and drivers can make; infinity where nothing limits
@@ -224,10 +221,8 @@ struct DynamicsError {
 // What still rings once the axes are made up for: a second mode, which hangs behind the ones of
 // `dynamics`. The base is then shaped against it. 0 Hz: there is none.
 struct SecondSettings {
-  double x_freq_hz = 0.0;
-  double x_damping_ratio = 0.05;
-  double y_freq_hz = 0.0;
-  double y_damping_ratio = 0.05;
+  Axes<double> freq_hz;
+  Axes<double> damping_ratio{0.05, 0.05};
   std::string shaper = "zv";  // "none": the mode is told of and verified, but not shaped
 };
 
@@ -323,8 +318,7 @@ struct Settings {
   ExtruderSettings extruder;
   PressureSettings pressure;
   HotendSettings hotend;
-  AxisDynamics dynamics_x;
-  AxisDynamics dynamics_y;
+  Axes<AxisDynamics> dynamics;
   DynamicsError dynamics_error;
   SecondSettings second;
   KinematicsSettings kinematics;
@@ -420,15 +414,11 @@ struct Settings {
   [[nodiscard]] double emit_accel_mm_s2(double asked_mm_s2) const;
   [[nodiscard]] double emit_accel_mm_s2() const { return emit_accel_mm_s2(0.0); }
   // 0 where the printer has no shaper, or where none is known.
-  [[nodiscard]] double shaper_freq_x_hz() const;
-  [[nodiscard]] double shaper_freq_y_hz() const;
+  [[nodiscard]] Axes<double> shaper_freq_hz() const;
   // Klipper: whether the printer may have a shaper that no source tells of.
-  [[nodiscard]] bool shaper_unknown_x() const;
-  [[nodiscard]] bool shaper_unknown_y() const;
-  [[nodiscard]] std::string shaper_type_x() const;
-  [[nodiscard]] std::string shaper_type_y() const;
-  [[nodiscard]] double shaper_damping_ratio_x() const;
-  [[nodiscard]] double shaper_damping_ratio_y() const;
+  [[nodiscard]] Axes<bool> shaper_unknown() const;
+  [[nodiscard]] Axes<std::string> shaper_type() const;
+  [[nodiscard]] Axes<double> shaper_damping_ratio() const;
 };
 
 // Where settings come from.

@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "unflex/core/axes.hpp"
+
 namespace unflex::report {
 
 // Contour error over the time in which filament is laid.
@@ -43,7 +45,7 @@ struct LayerPaths {
   std::string bytes;
   std::size_t layer_step = 1;  // only every n-th layer is stored
   // The print's rectangle: nearly all of the paths' length lies inside.
-  double x_min_mm = 0.0, x_max_mm = 0.0, y_min_mm = 0.0, y_max_mm = 0.0;
+  Axes<double> min_mm, max_mm;
   double tolerance_mm = 0.0;  // left-out points lie at most so far from what is drawn
 };
 
@@ -60,16 +62,15 @@ struct FeatureRow {
 struct Moment {
   double time_s = 0.0;  // since the reference was at the place
   double contour_mm = 0.0;
-  double reference_x_mm = 0.0, reference_y_mm = 0.0;
-  double base_x_mm = 0.0, base_y_mm = 0.0;
-  double nozzle_x_mm = 0.0, nozzle_y_mm = 0.0;
+  Axes<double> reference_mm, base_mm, nozzle_mm;
 };
 
 struct Place {
   std::size_t line = 0;
   std::size_t layer = 0;
   std::size_t feature = 0;
-  double x_mm = 0.0, y_mm = 0.0, z_mm = 0.0;
+  Axes<double> xy_mm;
+  double z_mm = 0.0;
   double before_mm = 0.0, after_mm = 0.0;  // largest contour error there
   std::vector<Moment> before, after;
 };

@@ -1,6 +1,7 @@
 // Source: Klipper docs/G-Codes.md (SET_VELOCITY_LIMIT, SET_INPUT_SHAPER, SET_PRESSURE_ADVANCE).
 #include <fmt/core.h>
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -46,10 +47,14 @@ void set_run_limits(const FirmwareConfig& /*config*/, const RunLimits& run, Limi
 
 void shaper_lines(const Shaper& wanted, const Shaper& /*current*/, ShaperAxes axes,
                   std::vector<std::string>& lines) {
-  if (axes.x || axes.y) {
-    lines.push_back("SET_INPUT_SHAPER" +
-                    (axes.x ? fmt::format(" SHAPER_FREQ_X={}", wanted.freq_x_hz) : "") +
-                    (axes.y ? fmt::format(" SHAPER_FREQ_Y={}", wanted.freq_y_hz) : ""));
+  if (any_axis(std::identity{}, axes)) {
+    std::string line = "SET_INPUT_SHAPER";
+    for_each_axis(
+        [&](std::string_view letter, bool is_set, double freq_hz) {
+          line += is_set ? fmt::format(" SHAPER_FREQ_{}={}", letter, freq_hz) : "";
+        },
+        kAxisLetters, axes, wanted.freq_hz);
+    lines.push_back(line);
   }
 }
 
@@ -61,8 +66,13 @@ std::string advance_line(const gcode::PressureAdvance& wanted) {
 }
 
 std::string unknown_shaper_lines(ShaperAxes axes) {
-  return fmt::format("SET_INPUT_SHAPER{}{}", axes.x ? " SHAPER_FREQ_X=..." : "",
-                     axes.y ? " SHAPER_FREQ_Y=..." : "");
+  std::string line = "SET_INPUT_SHAPER";
+  for_each_axis(
+      [&](std::string_view letter, bool is_unknown) {
+        line += is_unknown ? fmt::format(" SHAPER_FREQ_{}=...", letter) : "";
+      },
+      kAxisLetters, axes);
+  return line;
 }
 
 }  // namespace

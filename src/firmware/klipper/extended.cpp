@@ -141,34 +141,38 @@ void Interpreter::velocity_limit(Event& event) {
 // extras/input_shaper.py, cmd_SET_INPUT_SHAPER: SHAPER_TYPE is for both axes.
 void Interpreter::input_shaper(Event& event) {
   event.kind = EventKind::barrier;
-  const Parameter freq_x = number_of(command_, "SHAPER_FREQ_X");
-  const Parameter freq_y = number_of(command_, "SHAPER_FREQ_Y");
-  const Parameter damping_x = number_of(command_, "DAMPING_RATIO_X");
-  const Parameter damping_y = number_of(command_, "DAMPING_RATIO_Y");
-  if (freq_x.unreadable() || freq_y.unreadable() || damping_x.unreadable() ||
-      damping_y.unreadable()) {
+  const auto number = [&](std::string_view of) {
+    return map_axes(
+        [&](std::string_view letter) {
+          return number_of(command_, fmt::format("{}_{}", of, letter));
+        },
+        kAxisLetters);
+  };
+  const Axes<Parameter> freq = number("SHAPER_FREQ");
+  const Axes<Parameter> damping = number("DAMPING_RATIO");
+  if (any_axis([](const Parameter& of_axis) { return of_axis.unreadable(); }, freq) ||
+      any_axis([](const Parameter& of_axis) { return of_axis.unreadable(); }, damping)) {
     event.warnings.emplace_back("SET_INPUT_SHAPER with an invalid value is ignored");
     return;
   }
-  const auto type = [&](std::string_view key, std::string& target) {
-    const std::optional<std::string> both = command_.parameter("SHAPER_TYPE");
-    target = command_.parameter(key).value_or(both.value_or(target));
-  };
-  const auto number = [](const Parameter& given, auto& target) {
-    if (given.value) {
-      target = *given.value;
-    }
-  };
-  state_.shaper_unknown_x = state_.shaper_unknown_x && !freq_x.value;
-  state_.shaper_unknown_y = state_.shaper_unknown_y && !freq_y.value;
-  state_.shaper_touched_x = state_.shaper_touched_x && !freq_x.value;
-  state_.shaper_touched_y = state_.shaper_touched_y && !freq_y.value;
-  number(freq_x, state_.shaper_freq_x_hz);
-  number(freq_y, state_.shaper_freq_y_hz);
-  number(damping_x, state_.shaper.damping_ratio_x);
-  number(damping_y, state_.shaper.damping_ratio_y);
-  type("SHAPER_TYPE_X", state_.shaper.type_x);
-  type("SHAPER_TYPE_Y", state_.shaper.type_y);
+  const std::optional<std::string> both = command_.parameter("SHAPER_TYPE");
+  for_each_axis(
+      [&](std::string_view letter, std::string& type) {
+        type =
+            command_.parameter(fmt::format("SHAPER_TYPE_{}", letter)).value_or(both.value_or(type));
+      },
+      kAxisLetters, state_.shaper.type);
+  for_each_axis([](const Parameter& told,
+                   std::optional<double>& ratio) { ratio = told.value ? told.value : ratio; },
+                damping, state_.shaper.damping_ratio);
+  for_each_axis(
+      [](const Parameter& told, double& freq_hz, bool& unknown, bool& touched) {
+        if (told.value) {
+          freq_hz = *told.value;
+          unknown = touched = false;
+        }
+      },
+      freq, state_.shaper_freq_hz, state_.shaper_unknown, state_.shaper_touched);
   note_shaper(event);
 }
 
@@ -178,7 +182,7 @@ void Interpreter::input_shaper(Event& event) {
 // is.
 void Interpreter::object_label(Event& event) {
   event.kind = EventKind::border;
-  for (const Axis axis : {X, Y}) {
+  for (const Axis axis : kXY) {
     assumed_[axis] = assumed_[axis] || state_.known[axis];
     state_.known[axis] = false;
   }
@@ -245,7 +249,7 @@ void Interpreter::gcode_offset(Event& event) {
   constexpr std::array<std::string_view, 4> kAdjustKeys = {"X_ADJUST", "Y_ADJUST", "Z_ADJUST",
                                                            "E_ADJUST"};
   Position shift_mm{};
-  for (const Axis axis : {X, Y, Z, E}) {
+  for (const Axis axis : kXYZE) {
     const Parameter offset = number_of(command_, kKeys[axis]);
     const Parameter adjust = number_of(command_, kAdjustKeys[axis]);
     if (offset.unreadable() || (!offset.given && adjust.unreadable())) {
@@ -257,7 +261,7 @@ void Interpreter::gcode_offset(Event& event) {
   const Parameter move = number_of(command_, "MOVE");
   const bool moves = move.given && move.value != 0.0;
   event.kind = EventKind::border;
-  for (const Axis axis : {X, Y, Z, E}) {
+  for (const Axis axis : kXYZE) {
     state_.offset_mm[axis] += shift_mm[axis];
     state_.base_mm[axis] += shift_mm[axis];
     if (moves) {
@@ -281,7 +285,7 @@ void Interpreter::restore_state(Event& event) {
   state_.absolute_e = state.absolute_e;
   state_.base_mm = state.base_mm;
   state_.base_mm[E] += state_.position_mm[E] - state.position_mm[E];
-  for (const Axis axis : {X, Y, Z}) {
+  for (const Axis axis : kXYZ) {
     // If one of the two zeros was set at an unknown place, their distance on the bed is unknown.
     const bool zero_known = state_.base_known[axis] && state.base_known[axis];
     state_.known[axis] = state_.known[axis] && zero_known;
@@ -297,7 +301,7 @@ void Interpreter::restore_state(Event& event) {
   event.kind = EventKind::border;
   const Parameter move = number_of(command_, "MOVE");
   if (move.given && move.value != 0.0) {
-    for (const Axis axis : {X, Y, Z}) {
+    for (const Axis axis : kXYZ) {
       state_.position_mm[axis] = state.position_mm[axis];
     }
     lose_position(event);

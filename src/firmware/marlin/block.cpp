@@ -47,7 +47,7 @@ Travel travel(const Settings& settings, const Steps& delta, float e_factor) {
   for (std::size_t motor = 0; settings.shares_motors && motor < settings.motors.size(); ++motor) {
     std::int64_t steps = 0;
     float distance_mm = 0.0F;
-    for (const auto axis : {X, Y, Z}) {
+    for (const auto axis : gcode::kXYZ) {
       const int share = settings.motors[motor][axis];
       steps += share * delta[axis];
       distance_mm += static_cast<float>(share) * result.head_mm[axis];
@@ -137,7 +137,7 @@ Settings make_settings(const Limits& limits, const FirmwareConfig& config) {
   Settings s;
   const Motors motors = config.motors();
   for (std::size_t motor = 0; motor < s.motors.size(); ++motor) {
-    for (const auto axis : {X, Y, Z}) {
+    for (const auto axis : gcode::kXYZ) {
       s.motors[motor][axis] = static_cast<int>(motors.rows()[motor][axis]);
       s.shares_motors = s.shares_motors || (axis != motor && s.motors[motor][axis] != 0);
     }

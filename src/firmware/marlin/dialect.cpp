@@ -57,17 +57,25 @@ void set_run_limits(const FirmwareConfig& /*config*/, const RunLimits& run, Limi
 
 void shaper_lines(const Shaper& wanted, const Shaper& /*current*/, ShaperAxes axes,
                   std::vector<std::string>& lines) {
-  if (axes.x) {
-    lines.push_back(fmt::format("M593 X F{}", wanted.freq_x_hz));
-  }
-  if (axes.y) {
-    lines.push_back(fmt::format("M593 Y F{}", wanted.freq_y_hz));
-  }
+  for_each_axis(
+      [&](std::string_view letter, bool is_set, double freq_hz) {
+        if (is_set) {
+          lines.push_back(fmt::format("M593 {} F{}", letter, freq_hz));
+        }
+      },
+      kAxisLetters, axes, wanted.freq_hz);
 }
 
 std::string unknown_shaper_lines(ShaperAxes axes) {
-  return fmt::format("{}{}{}", axes.x ? "M593 X F..." : "", axes.x && axes.y ? " and " : "",
-                     axes.y ? "M593 Y F..." : "");
+  std::string lines;
+  for_each_axis(
+      [&](std::string_view letter, bool is_unknown) {
+        if (is_unknown) {
+          lines += fmt::format("{}M593 {} F...", lines.empty() ? "" : " and ", letter);
+        }
+      },
+      kAxisLetters, axes);
+  return lines;
 }
 
 }  // namespace

@@ -40,11 +40,11 @@ void marlin_junctions(CommandReader& reader, const gcode::Command& command,
 
 void marlin_shaper(CommandReader& reader, const gcode::Command& command, const SourcePlace& place) {
   if (command.has('X') || !command.has('Y')) {
-    reader.shaper("x", reader.state().shaper_freq_x_hz, reader.state().shaper.damping_ratio_x,
+    reader.shaper("x", reader.state().shaper_freq_hz.x, reader.state().shaper.damping_ratio.x,
                   place);
   }
   if (command.has('Y') || !command.has('X')) {
-    reader.shaper("y", reader.state().shaper_freq_y_hz, reader.state().shaper.damping_ratio_y,
+    reader.shaper("y", reader.state().shaper_freq_hz.y, reader.state().shaper.damping_ratio.y,
                   place);
   }
 }

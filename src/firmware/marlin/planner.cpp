@@ -117,7 +117,7 @@ std::size_t MarlinPlanner::pending() const {
 marlin::Steps MarlinPlanner::rounded(const gcode::Position& position_mm,
                                      std::optional<float> reading_of_e) const {
   marlin::Steps result{};
-  for (const auto axis : {X, Y, Z}) {
+  for (const auto axis : gcode::kXYZ) {
     result[axis] = whole(product(position_mm[axis], config_.steps_per_mm[axis]));
   }
   result[E] = whole(reading_of_e ? product(*reading_of_e, config_.steps_per_mm[E])

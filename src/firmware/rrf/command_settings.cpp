@@ -47,7 +47,7 @@ void Interpreter::rrf_max_velocity(Event& event) {
   raise(event.limits.edit().axis_max_velocity_mm_s, kMinVelocity_mm_s);
   // No printer is limited so on purpose. Marlin's M203 is in mm/s.
   constexpr double kSlow_mm_s = 10.0;
-  for (const Axis axis : {X, Y}) {
+  for (const Axis axis : kXY) {
     const auto& limit_mm_s = event.limits.edit().axis_max_velocity_mm_s[axis];
     if (limit_mm_s && *limit_mm_s < kSlow_mm_s && event.warnings.empty()) {
       event.warnings.push_back(

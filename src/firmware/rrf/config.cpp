@@ -184,18 +184,18 @@ Status RrfConfigReader::kinematics(const gcode::Command& command, std::string_vi
 void RrfConfigReader::shaper(const SourcePlace& place) {
   const gcode::ModalState& state = reader_.state();
   constexpr double kDefaultDampingRatio = 0.1;  // AxisShaper.h
-  if (state.shaper.type_x == "custom") {
+  if (state.shaper.type.x == "custom") {
     return reader_.reading.note(
         place,
         "a custom shaper cannot be set back after the print; unflex leaves it to "
         "the file's own M593");
   }
   for (const std::string axis : {"x", "y"}) {
-    reader_.shaper(axis, state.shaper_freq_x_hz,
-                   state.shaper.damping_ratio_x.value_or(kDefaultDampingRatio), place);
+    reader_.shaper(axis, state.shaper_freq_hz.x,
+                   state.shaper.damping_ratio.x.value_or(kDefaultDampingRatio), place);
   }
-  if (state.shaper_freq_x_hz > 0.0) {
-    reader_.reading.add("printer.input_shaper_type", state.shaper.type_x, place);
+  if (state.shaper_freq_hz.x > 0.0) {
+    reader_.reading.add("printer.input_shaper_type", state.shaper.type.x, place);
   }
 }
 

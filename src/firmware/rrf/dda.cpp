@@ -42,7 +42,7 @@ float reach(const Vector& direction, const Vector& box) {
 // takes.
 Vector travel(const gcode::Segment& segment) {
   Vector delta{};
-  for (const auto axis : {X, Y, Z}) {
+  for (const auto axis : gcode::kXYZ) {
     delta[axis] =
         static_cast<float>(segment.end_mm[axis]) - static_cast<float>(segment.start_mm[axis]);
   }
@@ -115,7 +115,7 @@ void limit_by_motors(const Settings& settings, Dda& dda) {
   const Motors::Rows& rows = settings.motors.rows();
   for (std::size_t motor = 0; motor < rows.size(); ++motor) {
     float part = 0.0F;
-    for (const auto axis : {X, Y, Z}) {
+    for (const auto axis : gcode::kXYZ) {
       if (shares_motor(rows, axis)) {
         part += static_cast<float>(rows[motor][axis]) * std::abs(dda.direction[axis]);
       }

@@ -70,15 +70,15 @@ void set_run_limits(const FirmwareConfig& config, const RunLimits& run, Limits& 
 // RepRapFirmware forgets the settings when it switches the shaper off, so they count only while it
 // is on.
 bool same_shaper(const Shaper& one, const Shaper& other) {
-  return one.freq_x_hz == other.freq_x_hz &&
-         (one.freq_x_hz == 0.0 || (one.settings.type_x == other.settings.type_x &&
-                                   one.settings.damping_ratio_x == other.settings.damping_ratio_x &&
+  return one.freq_hz.x == other.freq_hz.x &&
+         (one.freq_hz.x == 0.0 || (one.settings.type.x == other.settings.type.x &&
+                                   one.settings.damping_ratio.x == other.settings.damping_ratio.x &&
                                    one.settings.custom_words == other.settings.custom_words));
 }
 
 // RepRapFirmware has one shaper for both axes.
 std::string shaper_line(const Shaper& wanted) {
-  if (wanted.freq_x_hz == 0.0) {
+  if (wanted.freq_hz.x == 0.0) {
     return "M593 P\"none\"";
   }
   const gcode::ShaperSettings& settings = wanted.settings;
@@ -86,17 +86,17 @@ std::string shaper_line(const Shaper& wanted) {
     return "M593 " + settings.custom_words;
   }
   std::string line = fmt::format(
-      "M593 P\"{}\" F{}", settings.type_x.empty() ? kSpec.filters.shaper_type : settings.type_x,
-      wanted.freq_x_hz);
-  if (settings.damping_ratio_x) {
-    line += fmt::format(" S{}", *settings.damping_ratio_x);
+      "M593 P\"{}\" F{}", settings.type.x.empty() ? kSpec.filters.shaper_type : settings.type.x,
+      wanted.freq_hz.x);
+  if (settings.damping_ratio.x) {
+    line += fmt::format(" S{}", *settings.damping_ratio.x);
   }
   return line;
 }
 
 void shaper_lines(const Shaper& wanted, const Shaper& current, ShaperAxes axes,
                   std::vector<std::string>& lines) {
-  if (axes.x && (current.unknown_x || !same_shaper(wanted, current))) {
+  if (axes.x && (current.unknown.x || !same_shaper(wanted, current))) {
     lines.push_back(shaper_line(wanted));
   }
 }

@@ -48,7 +48,7 @@ Limits rrf_raised(Limits limits) {
   constexpr double kMinAccel_mm_s2 = 0.1;  // MinimumAcceleration
   const auto raise = [](double& value, double least) { value = std::max(value, least); };
   raise(limits.min_movement_velocity_mm_s, kMinSpeed_mm_s);
-  for (const auto axis : {X, Y, Z, E}) {
+  for (const auto axis : gcode::kXYZE) {
     raise(limits.axis_max_velocity_mm_s[axis], limits.min_movement_velocity_mm_s);
     raise(limits.axis_max_accel_mm_s2[axis], kMinAccel_mm_s2);
     raise(limits.axis_max_jerk_mm_s[axis], kMinJerk_mm_s);
@@ -102,7 +102,7 @@ void RrfPlanner::admit() {
   move.segment.end_mm = on_steps(segment.end_mm);
   move.length_mm = dda.length_mm;
   move.kinematic = dda.direction[X] != 0.0F || dda.direction[Y] != 0.0F || dda.direction[Z] != 0.0F;
-  for (const auto axis : {X, Y, Z, E}) {
+  for (const auto axis : gcode::kXYZE) {
     move.direction[axis] = move.segment.delta(axis) / move.length_mm;
   }
   provisional_.push_back(std::move(dda));
@@ -189,7 +189,7 @@ gcode::Position RrfPlanner::on_steps(const gcode::Position& position_mm) const {
   for (std::size_t motor = 0; motor < motors_mm.size(); ++motor) {
     float at_mm = 0.0F;
     double exactly_at_mm = 0.0;
-    for (const auto axis : {X, Y, Z}) {
+    for (const auto axis : gcode::kXYZ) {
       at_mm +=
           static_cast<float>(motors_.rows()[motor][axis]) * static_cast<float>(position_mm[axis]);
       exactly_at_mm += motors_.rows()[motor][axis] * position_mm[axis];

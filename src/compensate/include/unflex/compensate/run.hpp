@@ -7,11 +7,13 @@
 
 #include <array>
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "unflex/compensate/axis_window.hpp"
+#include "unflex/core/axes.hpp"
 #include "unflex/core/error.hpp"
 #include "unflex/dynamics/base_trajectory.hpp"
 #include "unflex/dynamics/shapers.hpp"
@@ -28,9 +30,7 @@ struct AxisSetup {
 };
 
 // Models that X and Y may have at the same time, by their numbers in AxisWindow.
-struct ModelPair {
-  std::size_t x = 0;
-  std::size_t y = 0;
+struct ModelPair : Axes<std::size_t> {
   double share = 1.0;
 };
 
@@ -46,11 +46,9 @@ struct Contour {
 // Pairs of the axes' models, so shared out that each model has its own share. Sorted by frequency,
 // 70 % of the pairs have both axes off the same way, as a heavier load makes them, and 30 % have
 // them off opposite ways.
-[[nodiscard]] std::vector<ModelPair> pairs_of(const AxisSetup& x, const AxisSetup& y);
+[[nodiscard]] std::vector<ModelPair> pairs_of(const Axes<AxisSetup>& setup);
 
-struct Setup {
-  AxisSetup x;
-  AxisSetup y;
+struct Setup : Axes<AxisSetup> {
   // Whether limits of velocity and acceleration, the same for X and Y, are those of motors that
   // move both: |ẋ| + |ẏ| ≤ V, |ẍ| + |ÿ| ≤ A.
   bool shares_motors = false;
@@ -65,7 +63,9 @@ struct Setup {
   std::optional<Contour> contour;  // unset: the nozzle shall be where r is at the time
 
   // Whether the base is to suit more models than the axes as given.
-  [[nodiscard]] bool is_robust() const { return !x.plants.empty() || !y.plants.empty(); }
+  [[nodiscard]] bool is_robust() const {
+    return any_axis([](const AxisSetup& axis) { return !axis.plants.empty(); }, *this);
+  }
 };
 
 // What the nozzle shall follow: the plan of a run, or of a part of one.
@@ -122,16 +122,13 @@ struct WindowSpan {
 
 // A vertex of the path.
 struct PathVertex {
-  double x_mm = 0.0;
-  double y_mm = 0.0;
+  XY place_mm;
   double sample = 0.0;    // when r is there, in half node periods from the window's first node on
   bool is_sharp = false;  // a sharp corner, or an end of a run
 };
 
 // Both axes of one window.
-struct RunWindow {
-  AxisWindow x;
-  AxisWindow y;
+struct RunWindow : Axes<AxisWindow> {
   bool shares_motors = false;  // as in Setup
   // Only with a contour: the path of the window and as far around it as its reach.
   std::optional<Contour> contour = {};
@@ -156,8 +153,14 @@ struct RunWindow {
 // Solves X and Y of a window by the engine; in a cruise the solution is the reference. With a
 // contour the window gets the aims and weights, and if the axes share motors it gets the limits at
 // the nodes, under which each axis by itself has this solution.
-using AxisSolutions = std::array<Result<AxisSolution>, 2>;
+using AxisSolutions = Axes<Result<AxisSolution>>;
 [[nodiscard]] AxisSolutions solve(const Engine& engine, const WindowSpan& span, RunWindow& window);
+
+// The base over all nodes, where `windows` are those of `spans`: solves each window here, and joins
+// the solutions. An error: the first axis that could not be solved. each: sees every solution.
+[[nodiscard]] Result<dynamics::BaseTrajectory> solve_all(
+    const Engine& engine, const std::vector<WindowSpan>& spans, std::vector<RunWindow>& windows,
+    const std::function<void(const AxisSolution&)>& each = nullptr);
 
 // Makes each axis of a window a problem of its own, as solve() does, for an engine that solves it
 // elsewhere. divider: solves here what has to be solved for that.

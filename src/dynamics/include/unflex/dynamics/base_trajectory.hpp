@@ -5,6 +5,9 @@
 #include <cstddef>
 #include <vector>
 
+#include "unflex/core/axes.hpp"
+#include "unflex/core/xy.hpp"
+
 namespace unflex::dynamics {
 
 // One axis at the nodes. b̈ is linear between nodes, so b is a cubic there.
@@ -31,17 +34,22 @@ struct AxisMotion {
           axis.velocity_mm_s[k] + s * (a0 + 0.5 * s * jerk), a0 + s * jerk};
 }
 
-struct BaseTrajectory {
+struct BaseTrajectory : Axes<AxisTrajectory> {
   double period_s = 0.0;  // h
-  AxisTrajectory x;
-  AxisTrajectory y;
 
   [[nodiscard]] std::size_t nodes() const { return x.position_mm.size(); }
   [[nodiscard]] double duration_s() const { return static_cast<double>(nodes() - 1) * period_s; }
   // t is clamped to [0, duration_s()].
-  [[nodiscard]] AxisMotion x_at(double t) const { return at(x, t); }
-  [[nodiscard]] AxisMotion y_at(double t) const { return at(y, t); }
-  // axis: x or y.
+  [[nodiscard]] Axes<AxisMotion> at(double t) const {
+    return map_axes([&](const AxisTrajectory& axis) { return at(axis, t); }, *this);
+  }
+  [[nodiscard]] XY position_mm(double t) const {
+    return map_axes([](const AxisMotion& motion) { return motion.position_mm; }, at(t));
+  }
+  [[nodiscard]] XY velocity_mm_s(double t) const {
+    return map_axes([](const AxisMotion& motion) { return motion.velocity_mm_s; }, at(t));
+  }
+  // One of the axes alone.
   [[nodiscard]] AxisMotion at(const AxisTrajectory& axis, double t) const {
     const double clamped = std::clamp(t, 0.0, duration_s());
     const auto k = std::min(static_cast<std::size_t>(clamped / period_s), nodes() - 2);

@@ -22,6 +22,9 @@
 #include <span>
 #include <vector>
 
+#include "unflex/core/axes.hpp"
+#include "unflex/core/xy.hpp"
+
 namespace unflex::dynamics {
 
 // The most modes that an axis can have.
@@ -44,10 +47,13 @@ struct NozzleMotion {
   double velocity = 0.0;
 };
 
-struct NozzleMotionXY {
-  NozzleMotion x;
-  NozzleMotion y;
-};
+using NozzleMotionXY = Axes<NozzleMotion>;
+[[nodiscard]] inline XY place_mm(const NozzleMotionXY& nozzle) {
+  return map_axes([](const NozzleMotion& of_axis) { return of_axis.position; }, nozzle);
+}
+[[nodiscard]] inline XY velocity_mm_s(const NozzleMotionXY& nozzle) {
+  return map_axes([](const NozzleMotion& of_axis) { return of_axis.velocity; }, nozzle);
+}
 
 // All that determines the nozzle's motion on one axis, once that of the base is given: q_i and its
 // velocity. States of the same axis may be added up and scaled.
@@ -72,13 +78,14 @@ struct NozzleState {
 };
 static_assert(kMostModes == 3, "NozzleState adds up three parts");
 
-// The nozzle on both axes.
-struct NozzleXY {
-  NozzleState x;
-  NozzleState y;
-
-  [[nodiscard]] NozzleMotionXY motion() const { return {x.motion(), y.motion()}; }
-};
+// The nozzle on both axes, and its place, mm.
+using NozzleXY = Axes<NozzleState>;
+[[nodiscard]] inline NozzleMotionXY motion(const NozzleXY& nozzle) {
+  return map_axes([](const NozzleState& state) { return state.motion(); }, nozzle);
+}
+[[nodiscard]] inline XY place_mm(const NozzleXY& nozzle) {
+  return map_axes([](const NozzleState& state) { return state.position(); }, nozzle);
+}
 
 // Motion of the base over one step of constant acceleration: b(t) = b0 + v0 t + a t²/2.
 struct BaseSegment {
@@ -86,6 +93,15 @@ struct BaseSegment {
   double velocity = 0.0;      // v0, mm/s
   double acceleration = 0.0;  // a, mm/s²
 };
+
+// The base on both axes.
+using BaseXY = Axes<BaseSegment>;
+[[nodiscard]] inline XY place_mm(const BaseXY& base) {
+  return map_axes([](const BaseSegment& of_axis) { return of_axis.position; }, base);
+}
+[[nodiscard]] inline XY velocity_mm_s(const BaseXY& base) {
+  return map_axes([](const BaseSegment& of_axis) { return of_axis.velocity; }, base);
+}
 
 class FlexibleAxis {
  public:
@@ -200,5 +216,13 @@ class ExactMap {
   std::array<OfMode, kMostModes> maps_;
   std::size_t count_ = 1;
 };
+
+// The nozzle that goes along with a base in even motion on all axes.
+[[nodiscard]] inline NozzleXY riding(const Axes<FlexibleAxis>& axes, const XY& position_mm,
+                                     const XY& velocity_mm_s = {}) {
+  return map_axes([](const FlexibleAxis& axis, double place_mm,
+                     double speed_mm_s) { return axis.riding(place_mm, speed_mm_s); },
+                  axes, position_mm, velocity_mm_s);
+}
 
 }  // namespace unflex::dynamics

@@ -16,13 +16,11 @@ struct Reach {
 };
 
 struct LineRules {
-  dynamics::FlexibleAxis nozzle_x;  // what hangs on the base
-  dynamics::FlexibleAxis nozzle_y;
+  Axes<dynamics::FlexibleAxis> nozzle;  // what hangs on the base
   // The frequencies may be off by this share, up and down. Lines between whole steps suit nozzles
   // that are. 0: the frequencies are exact.
   double freq_error = 0.0;
-  Reach reach_x;
-  Reach reach_y;
+  Axes<Reach> reach;
   double tolerance_mm = 3e-4;  // largest nozzle error by what one line leaves out
   double min_line_s = 1e-3;    // shortest duration of a line
   double min_line_mm = 0.0;    // shortest length of a line along X or Y

@@ -55,7 +55,7 @@ struct Run {
   // This part continues the previous one. `from_mm` is where that ended; unset: the grid point
   // nearest to the base.
   bool goes_on = false;
-  std::optional<std::array<double, 2>> from_mm = {};
+  std::optional<XY> from_mm = {};
   double late_s = 0.0;  // how late its first line begins
   // The motion just before the run, if the machine does not stop between the two: filament or Z
   // alone.
@@ -69,7 +69,7 @@ struct Run {
 // A run cut into lines, for a certain start. It has no lines if its motion is too small for one.
 struct RunPlan {
   RunStart start;
-  std::array<double, 2> from_mm{};  // where the first line begins
+  XY from_mm;  // where the first line begins
   std::shared_ptr<const std::vector<Stroke>> strokes;
 
   [[nodiscard]] bool empty() const;

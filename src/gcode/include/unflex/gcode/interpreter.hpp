@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <functional>
 #include <limits>
 #include <map>
 #include <optional>
@@ -10,14 +11,19 @@
 #include <string_view>
 #include <vector>
 
+#include "unflex/core/axes.hpp"
 #include "unflex/core/firmware.hpp"
 #include "unflex/core/lazy.hpp"
+#include "unflex/core/xy.hpp"
 #include "unflex/gcode/command.hpp"
 #include "unflex/gcode/line.hpp"
 
 namespace unflex::gcode {
 
 enum Axis : std::size_t { X = 0, Y = 1, Z = 2, E = 3 };
+inline constexpr std::array kXY{X, Y};
+inline constexpr std::array kXYZ{X, Y, Z};
+inline constexpr std::array kXYZE{X, Y, Z, E};
 
 // X, Y, Z and filament, mm.
 using Position = std::array<double, 4>;
@@ -54,7 +60,8 @@ struct Segment {
   std::optional<ReadingOfE> reading_of_e = std::nullopt;
 
   [[nodiscard]] double delta(Axis axis) const { return end_mm[axis] - start_mm[axis]; }
-  [[nodiscard]] bool moves_xy() const { return delta(X) != 0.0 || delta(Y) != 0.0; }
+  [[nodiscard]] XY way_xy_mm() const { return xy_of(end_mm) - xy_of(start_mm); }
+  [[nodiscard]] bool moves_xy() const { return way_xy_mm() != XY{}; }
   [[nodiscard]] double length_xy_mm() const;
   // Length in X, Y and Z.
   [[nodiscard]] double length_mm() const;
@@ -91,10 +98,8 @@ struct LimitChange {
 // What a line that sets the input shaper again must say besides the frequencies. A setting is empty
 // if the file has not changed the configured one.
 struct ShaperSettings {
-  std::string type_x;  // Klipper SHAPER_TYPE, RepRapFirmware P (one type for both axes)
-  std::string type_y;
-  std::optional<double> damping_ratio_x;  // Klipper DAMPING_RATIO, Marlin D, RepRapFirmware S
-  std::optional<double> damping_ratio_y;
+  Axes<std::string> type;  // Klipper SHAPER_TYPE, RepRapFirmware P (one type for both axes)
+  Axes<std::optional<double>> damping_ratio;  // Klipper DAMPING_RATIO, Marlin D, RepRapFirmware S
   // RepRapFirmware keeps the frequency while P"none" switches the shaper off.
   std::optional<double> kept_freq_hz;
   std::string custom_words;  // RepRapFirmware: the words of M593 P"custom", H and T among them
@@ -104,15 +109,15 @@ struct ShaperSettings {
 
 // The firmware's own input shaper.
 struct Shaper {
-  double freq_x_hz = 0.0;  // 0: off
-  double freq_y_hz = 0.0;
+  Axes<double> freq_hz;  // 0: off
   ShaperSettings settings;
   // The printer may have a shaper that nobody has told of. The frequency is 0 meanwhile.
-  bool unknown_x = false;
-  bool unknown_y = false;
+  Axes<bool> unknown;
 
-  [[nodiscard]] bool is_on() const { return freq_x_hz > 0.0 || freq_y_hz > 0.0; }
-  [[nodiscard]] bool is_unknown() const { return unknown_x || unknown_y; }
+  [[nodiscard]] bool is_on() const {
+    return any_axis([](double hz) { return hz > 0.0; }, freq_hz);
+  }
+  [[nodiscard]] bool is_unknown() const { return any_axis(std::identity{}, unknown); }
 };
 
 // Whether a macro or a tool change can switch a shaper on, where `own` is the printer's own.
@@ -192,10 +197,8 @@ struct InterpreterOptions {
   // Klipper's [gcode_arcs] resolution: arcs become straight pieces about this long.
   double arc_resolution_mm = 1.0;
   // The firmware's input shaper; 0: the printer has none, or it is not known which.
-  double shaper_freq_x_hz = 0.0;
-  double shaper_freq_y_hz = 0.0;
-  bool shaper_unknown_x = false;
-  bool shaper_unknown_y = false;
+  Axes<double> shaper_freq_hz{};
+  Axes<bool> shaper_unknown{};
   double retract_z_hop_mm = 0.0;  // Marlin and RepRapFirmware, M207 Z
   MarlinArcs marlin_arcs{};
   // RepRapFirmware's M593 P in config.g. P"none", which switches the shaper off, replaces the type,
@@ -255,21 +258,16 @@ struct ModalState {
   bool retracted = false;              // firmware retraction
   double hop_mm = 0.0;                 // how far G10 has lifted Z
   bool auto_retract = false;           // Marlin, M209: moves of E alone are firmware retraction
-  double shaper_freq_x_hz = 0.0;       // SET_INPUT_SHAPER, M593; 0: off
-  double shaper_freq_y_hz = 0.0;
-  bool shaper_unknown_x = false;  // until the file sets it
-  bool shaper_unknown_y = false;
+  Axes<double> shaper_freq_hz;         // SET_INPUT_SHAPER, M593; 0: off
+  Axes<bool> shaper_unknown;           // until the file sets it
   // A macro, a tool change or the like may have set the shaper since the text has.
-  bool shaper_touched_x = true;
-  bool shaper_touched_y = true;
+  Axes<bool> shaper_touched{true, true};
   ShaperSettings shaper;
   PressureAdvance pressure_advance;
   AxisValues steps_per_mm;    // M92, where the file sets it
   bool inverse_time = false;  // RepRapFirmware, G93: F is one over minutes
 
-  [[nodiscard]] Shaper input_shaper() const {
-    return {shaper_freq_x_hz, shaper_freq_y_hz, shaper, shaper_unknown_x, shaper_unknown_y};
-  }
+  [[nodiscard]] Shaper input_shaper() const { return {shaper_freq_hz, shaper, shaper_unknown}; }
   // Whether an E word is a reading of the axis and not a difference.
   [[nodiscard]] bool e_is_absolute() const { return absolute_e && (absolute_xyz || !g91_covers_e); }
   // Filament per unit of E before unit and mode: M221 times, if E is a volume, one over the

@@ -30,7 +30,6 @@ inline constexpr double kGrid_mm = 1e-4;
                                             double damping_ratio);
 // The axes as they swing. Windows are solved for the axes of `dynamics` alone, without what rings
 // behind them (SecondSettings).
-[[nodiscard]] dynamics::FlexibleAxis nozzle_x(const Settings& settings);
-[[nodiscard]] dynamics::FlexibleAxis nozzle_y(const Settings& settings);
+[[nodiscard]] Axes<dynamics::FlexibleAxis> nozzle_axes(const Settings& settings);
 
 }  // namespace unflex::machine

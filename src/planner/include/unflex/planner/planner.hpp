@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "unflex/core/axes.hpp"
 #include "unflex/core/firmware.hpp"
 #include "unflex/core/kinematics.hpp"
 #include "unflex/gcode/interpreter.hpp"
@@ -63,10 +64,8 @@ void apply(const gcode::LimitChange& change, Limits& limits);
 // The printer's own input shaper as its configuration has it, unless a file sets another. The
 // defaults are Klipper's (klippy/extras/shaper_defs.py).
 struct InstalledShaper {
-  std::string type_x = "mzv";  // as the firmware spells it, in lower case
-  std::string type_y = "mzv";
-  double damping_ratio_x = 0.1;
-  double damping_ratio_y = 0.1;
+  Axes<std::string> type{"mzv", "mzv"};  // as the firmware spells it, in lower case
+  Axes<double> damping_ratio{0.1, 0.1};
 };
 
 // What only the firmware's configuration decides.

@@ -24,11 +24,10 @@ namespace unflex::planner {
 // plan. Marlin plays the plan at once and the second pulse later (stepper.cpp, pulse_phase_isr);
 // RepRapFirmware delays all pulses but the first, too. Where the axes' shapers differ, X and Y are
 // then out of step.
-struct Shaping {
-  dynamics::ShaperPulses x;
-  dynamics::ShaperPulses y;
-
-  [[nodiscard]] bool acts() const { return !x.empty() || !y.empty(); }
+struct Shaping : Axes<dynamics::ShaperPulses> {
+  [[nodiscard]] bool acts() const {
+    return any_axis([](const dynamics::ShaperPulses& pulses) { return !pulses.empty(); }, *this);
+  }
   // The longest time by which the machine moves before the plan.
   [[nodiscard]] double lead_s() const;
   // The longest time by which the machine moves before a motion begins or after it ends.

@@ -18,8 +18,7 @@ namespace unflex::record {
 // axis without pulses is not shaped.
 struct PrinterShaper {
   std::string name;
-  dynamics::ShaperPulses x;
-  dynamics::ShaperPulses y;
+  Axes<dynamics::ShaperPulses> pulses;
 };
 
 struct Options {

@@ -7,7 +7,9 @@
 #include <cstddef>
 #include <vector>
 
+#include "unflex/core/axes.hpp"
 #include "unflex/core/problem_size.hpp"
+#include "unflex/core/xy.hpp"
 #include "unflex/dynamics/base_trajectory.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
 #include "unflex/dynamics/shapers.hpp"
@@ -37,6 +39,13 @@ struct SolvedPath {
 [[nodiscard]] AxisPath reference_path(const std::vector<planner::PlannedMove>& moves,
                                       gcode::Axis axis);
 
+// X and Y of a function of moves and an axis, such as reference_path().
+template <typename F>
+[[nodiscard]] auto on_axes_of(const std::vector<planner::PlannedMove>& moves, const F& path_of) {
+  constexpr Axes<gcode::Axis> kNumbers{gcode::X, gcode::Y};
+  return map_axes([&](gcode::Axis axis) { return path_of(moves, axis); }, kNumbers);
+}
+
 // Σ weight · b(t − time_s), exactly.
 [[nodiscard]] AxisPath shaped(const AxisPath& path, const dynamics::ShaperPulses& pulses);
 
@@ -58,6 +67,10 @@ class PathCursor {
 
 // When the last parabola begins. If the path comes to rest, it does so then.
 [[nodiscard]] double end_s(const AxisPath& path);
+
+// The least and the largest of both axes.
+[[nodiscard]] double start_s(const Axes<AxisPath>& paths);
+[[nodiscard]] double end_s(const Axes<AxisPath>& paths);
 
 struct PeakMotion {
   double velocity_mm_s = 0.0;
@@ -85,6 +98,18 @@ class NozzleWalk {
   // For steps of this length, which came twice in a row.
   double map_step_s_ = 0.0;
   dynamics::ExactMap map_;
+};
+
+// The nozzle on the paths of both axes.
+class NozzleWalkXY {
+ public:
+  NozzleWalkXY(const Axes<dynamics::FlexibleAxis>& axes, const Axes<AxisPath>& paths,
+               double start_s);
+  [[nodiscard]] dynamics::NozzleMotionXY motion(double t);
+  [[nodiscard]] XY place_mm(double t);
+
+ private:
+  Axes<NozzleWalk> walks_;
 };
 
 // Sampling times: start_s + k · step_s for k = 0 … count − 1.

@@ -14,6 +14,7 @@
 #include <deque>
 #include <vector>
 
+#include "unflex/core/axes.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
 #include "unflex/dynamics/shapers.hpp"
 
@@ -28,7 +29,7 @@ class ShapedNozzle {
  public:
   // The trains of the two axes may belong to different shapers. An empty train leaves its axis as
   // it is.
-  ShapedNozzle(const dynamics::ShaperPulses& x, const dynamics::ShaperPulses& y);
+  explicit ShapedNozzle(const Axes<dynamics::ShaperPulses>& pulses);
 
   // Adds a sample of the unshaped nozzle; times must increase. Between samples the nozzle is on the
   // cubic through position and velocity (off by less than 1e-6 mm for samples 0.5 ms apart at 100
@@ -55,13 +56,10 @@ class ShapedNozzle {
     std::size_t index = 0;  // number of the sample at or before the delayed time
   };
 
-  [[nodiscard]] dynamics::NozzleMotion sum(std::vector<Tap>& taps,
-                                           dynamics::NozzleMotion dynamics::NozzleMotionXY::*axis,
-                                           double time_s);
+  [[nodiscard]] dynamics::NozzleMotion sum(std::size_t axis, double time_s);
   void forget_before(double time_s);
 
-  std::vector<Tap> x_;
-  std::vector<Tap> y_;
+  Axes<std::vector<Tap>> taps_;
   double lookahead_s_ = 0.0;
   double memory_s_ = 0.0;
   std::deque<Sample> samples_;

@@ -31,22 +31,27 @@ class NozzleOnBase {
  public:
   // Both must outlive it.
   NozzleOnBase(const dynamics::BaseTrajectory& base, const verify::NozzleModel& model)
-      : base_(&base), x_(model.x, base.period_s), y_(model.y, base.period_s) {}
+      : base_(&base),
+        maps_(map_axes(
+            [&](const dynamics::FlexibleAxis& axis) {
+              return dynamics::NodeMap(axis, base.period_s);
+            },
+            model)) {}
 
   // From node k to the next.
   void advance(std::size_t k, dynamics::NozzleXY& nozzle) const {
-    x_.advance(base_->x, k, nozzle.x);
-    y_.advance(base_->y, k, nozzle.y);
+    for_each_axis([&](const dynamics::NodeMap& map, const dynamics::AxisTrajectory& base,
+                      dynamics::NozzleState& state) { map.advance(base, k, state); },
+                  maps_, *base_, nozzle);
   }
 
  private:
   const dynamics::BaseTrajectory* base_;
-  dynamics::NodeMap x_;
-  dynamics::NodeMap y_;
+  Axes<dynamics::NodeMap> maps_;
 };
 
 // The part of an offset that is across the segment, which moves in X or Y; without sign.
-[[nodiscard]] double across_mm(const gcode::Segment& segment, double x_mm, double y_mm);
+[[nodiscard]] double across_mm(const gcode::Segment& segment, const XY& offset_mm);
 
 // The nozzle from piece to piece, the printer's own shaper included.
 //
@@ -88,7 +93,7 @@ class NozzleFollower {
   gcode::Shaper printer_;     // shaper that the input has set
   gcode::Shaper present_;     // shaper that acts in the output
   planner::Shaping shaping_;  // how present_ acts
-  std::array<double, 2> base_mm_{};
+  XY base_mm_;
   dynamics::NozzleXY driven_;   // u; without a shaper the nozzle itself
   dynamics::NozzleXY ringing_;  // the second term of p, as a deviation from the base
 };

@@ -72,8 +72,8 @@ struct TimingSearch {
 // The windows of a run, and what became of them.
 struct RunWindows {
   std::vector<compensate::WindowSpan> spans;
-  std::vector<std::array<AxisResult, 2>> results;  // X and Y, one per span
-  std::atomic<std::size_t> unsolved = 0;           // axes of windows
+  std::vector<Axes<AxisResult>> results;  // X and Y, one per span
+  std::atomic<std::size_t> unsolved = 0;  // axes of windows
   std::vector<Probe> probes;
 };
 

@@ -23,9 +23,7 @@ class TravelCheck {
 
  private:
   struct Side {
-    double min_mm = 0.0;
-    double max_mm = 0.0;
-    bool min_assumed = false;
+    verify::TravelRange limit;
     double under_mm = 0.0;  // how far moves go beyond either end
     double over_mm = 0.0;
     [[nodiscard]] bool add(double at_mm);
@@ -33,7 +31,7 @@ class TravelCheck {
     [[nodiscard]] double furthest_mm() const;
   };
 
-  std::array<Side, 2> sides_;  // of X and Y
+  Axes<Side> sides_;
   std::size_t moves_ = 0;
   std::size_t first_line_ = 0;
 };

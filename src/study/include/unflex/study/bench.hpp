@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "unflex/compensate/run.hpp"
+#include "unflex/core/axes.hpp"
 #include "unflex/core/problem_size.hpp"
 #include "unflex/planner/planner.hpp"
 #include "unflex/rivals/axis_path.hpp"
@@ -56,10 +57,7 @@ inline constexpr double kPrintStep_s = 2e-4;
 inline constexpr int kPrintParts = 5;
 
 // The axes that hang on the base.
-struct Nozzle {
-  dynamics::FlexibleAxis x;
-  dynamics::FlexibleAxis y;
-};
+using Nozzle = Axes<dynamics::FlexibleAxis>;
 
 struct BenchSetup {
   // The acceleration limits of both are set per method.
@@ -78,7 +76,8 @@ struct BenchSetup {
   double trace_to_s = 0.0;    // end of the traces in the plan
 
   [[nodiscard]] Nozzle nozzle() const {
-    return two_stage.value_or(Nozzle{unflex.x.axis, unflex.y.axis});
+    return two_stage.value_or(
+        map_axes([](const compensate::AxisSetup& of) { return of.axis; }, unflex));
   }
 };
 
@@ -90,9 +89,7 @@ struct Run {
 };
 
 // The base as a method moves it over a run.
-struct BaseMotion {
-  rivals::AxisPath x;
-  rivals::AxisPath y;
+struct BaseMotion : Axes<rivals::AxisPath> {
   ProblemSize size = {};  // of both axes
   int iterations = 0;     // systems of equations solved for both axes; of unflex, of its engine
   std::string remark = {};

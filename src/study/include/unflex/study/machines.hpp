@@ -25,8 +25,7 @@ struct MachineAxis {
 
 struct Machine {
   std::string name;
-  MachineAxis x;
-  MachineAxis y;
+  Axes<MachineAxis> axes;
   compensate::Setup unflex;  // the axes as they are known, and what the printer allows
 };
 

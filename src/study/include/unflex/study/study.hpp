@@ -7,6 +7,7 @@
 #include "unflex/compensate/axis_window.hpp"
 #include "unflex/core/error.hpp"
 #include "unflex/core/progress.hpp"
+#include "unflex/core/xy.hpp"
 #include "unflex/report/report.hpp"
 #include "unflex/study/bench.hpp"
 #include "unflex/study/case.hpp"
@@ -22,8 +23,7 @@ struct CaseResult {
   std::size_t runs = 1;
   BenchResult methods;
   // The place that the figures zoom in on. For a print it is the worst uncompensated place.
-  double focus_x_mm = 0.0;
-  double focus_y_mm = 0.0;
+  XY focus_mm = {};
 };
 
 struct ChainResult {

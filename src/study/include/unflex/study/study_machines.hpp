@@ -14,8 +14,7 @@ namespace unflex::study {
 struct KnownMachine {
   std::string name;
   machine::Settings settings;
-  study::MachineAxis x;
-  study::MachineAxis y;
+  Axes<study::MachineAxis> axes;
 };
 
 // Tries all contenders on every run of `job.input`, planned as `compensate` plans it. Settings are

@@ -57,10 +57,7 @@ struct Extruder {
                                         const planner::FirmwareConfig& config);
 
 // AxisSetup::plants of both axes.
-struct Plants {
-  std::vector<compensate::Plant> x;
-  std::vector<compensate::Plant> y;
-};
+using Plants = Axes<std::vector<compensate::Plant>>;
 
 // A run's path in a new timing.
 struct Timed {

@@ -12,14 +12,15 @@
 // the same speed. Whatever shows in that last part is the swing of the axis across the wall.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "unflex/core/axes.hpp"
 #include "unflex/core/error.hpp"
 #include "unflex/core/firmware.hpp"
+#include "unflex/core/xy.hpp"
 #include "unflex/tune/trial.hpp"
 
 namespace unflex::tune {
@@ -28,14 +29,11 @@ namespace unflex::tune {
 struct Codes {
   std::string start;  // heats, homes and primes
   std::string end;    // cools
-  double center_x_mm = 0.0;
-  double center_y_mm = 0.0;
+  XY center_mm = {};
 };
 
 // Limits of a printer, mm/s².
-struct AccelLimits {
-  double x = 0.0;
-  double y = 0.0;
+struct AccelLimits : XY {
   double print = 0.0;
   double travel = 0.0;
 };
@@ -54,7 +52,7 @@ struct TowerPrinter {
 };
 
 struct TowerSettings : TowerPrinter {
-  std::array<Trial, 2> trials;  // X's and Y's
+  Axes<Trial> trials;  // X's and Y's
 };
 
 // The straight part of a wall behind its waves.
@@ -77,8 +75,7 @@ struct Tower {
   std::vector<Wall> walls;         // of a tower for axes: the right one and the bottom one
   double side_mm = 0.0;            // of the square
   double brim_mm = 0.0;            // how far the brim reaches beyond it
-  double begin_x_mm = 0.0;         // where each band begins and ends
-  double begin_y_mm = 0.0;
+  XY begin_mm;                     // where each band begins and ends
 };
 
 // The comments around the G-code of a band, each behind a standstill. Numbers count from 1.
@@ -91,7 +88,7 @@ struct Tower {
 // What the file of a tower says of itself: enough to read it and to make the next. Errors are of
 // kind input: the file is none.
 struct TowerRecord {
-  std::array<Trial, 2> trials;
+  Axes<Trial> trials;
   Codes codes;
 };
 [[nodiscard]] Result<TowerRecord> record_of(const std::string& text, const std::string& name);

@@ -13,6 +13,7 @@
 #include <deque>
 #include <limits>
 
+#include "unflex/core/xy.hpp"
 #include "unflex/planner/planner.hpp"
 #include "unflex/verify/log_histogram.hpp"
 
@@ -50,12 +51,12 @@ class CornerGauge {
   void follow(const planner::PlannedMove& move, double start_s, double end_s);
   // The nozzle is here at time_s. It has come straight from the last place, so samples must be
   // close. Times must not decrease.
-  void sample(double time_s, double x_mm, double y_mm) {
+  void sample(double time_s, const XY& place_mm) {
     // A verification comes here at every step, mostly with no corner within reach.
     if (time_s < next_s_) {
       drawn_ = false;
     } else {
-      look(time_s, x_mm, y_mm);
+      look(time_s, place_mm);
     }
   }
   // Nobody looks at this time. What is within reach now counts for nothing, since the nozzle may
@@ -72,14 +73,13 @@ class CornerGauge {
   struct Corner {
     double from_s = 0.0;
     double until_s = 0.0;
-    double x_mm = 0.0;
-    double y_mm = 0.0;
+    XY place_mm;
     double distance2_mm2 = 0.0;  // smallest so far
     std::size_t line = 0;
     bool missed = false;
   };
 
-  void look(double time_s, double x_mm, double y_mm);
+  void look(double time_s, const XY& place_mm);
   void let_go();
   void find_next();
 
@@ -91,11 +91,9 @@ class CornerGauge {
   double next_s_ = std::numeric_limits<double>::infinity();
   bool open_ = false;
   gcode::Position end_mm_{};  // where the last move in X and Y has ended, and its direction
-  double direction_x_ = 0.0;
-  double direction_y_ = 0.0;
+  XY direction_;
   bool drawn_ = false;  // the nozzle's last place is known
-  double last_x_mm_ = 0.0;
-  double last_y_mm_ = 0.0;
+  XY last_mm_;
   CornerAccumulator left_behind_;
 };
 

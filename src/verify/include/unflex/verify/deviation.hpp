@@ -75,9 +75,7 @@ class DeviationAccumulator {
 };
 
 // The model the nozzle hangs on and how finely it is integrated.
-struct NozzleModel {
-  dynamics::FlexibleAxis x;
-  dynamics::FlexibleAxis y;
+struct NozzleModel : Axes<dynamics::FlexibleAxis> {
   // Longest time between two looks. Looks are also taken where acceleration changes.
   double step_s = 5e-4;
   double hold_s = 0.5;  // how long the base is held after the end of the file
@@ -111,8 +109,7 @@ struct RunDeviation {
   DeviationAccumulator extruding;
   DeviationAccumulator all;
   NozzleXY end;  // nozzle at the end of the base's motion
-  double base_end_x_mm = 0.0;
-  double base_end_y_mm = 0.0;
+  XY base_end_mm;
 };
 
 // Integrates the nozzle while the base makes the moves `base`, and measures it against the path and

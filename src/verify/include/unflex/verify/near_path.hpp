@@ -10,6 +10,7 @@
 #include <limits>
 #include <vector>
 
+#include "unflex/core/xy.hpp"
 #include "unflex/verify/deviation.hpp"
 #include "unflex/verify/reference_path.hpp"
 
@@ -30,16 +31,14 @@ class NearPath {
   void slide(const ReferencePath& path, double t);
   // Squared contour error of a nozzle at p at the time of the last slide(). `nearest` becomes the
   // number of the nearest piece.
-  [[nodiscard]] double squared_contour_error(const ReferencePath& path, double p_x_mm,
-                                             double p_y_mm, std::size_t& nearest);
+  [[nodiscard]] double squared_contour_error(const ReferencePath& path, const XY& p_mm,
+                                             std::size_t& nearest);
   [[nodiscard]] double reach_s() const { return reach_s_; }
 
   // A piece of the path within reach: where it begins, and its direction and length in X and Y.
   struct Span {
-    double x_mm = 0.0;
-    double y_mm = 0.0;
-    double direction_x = 0.0;
-    double direction_y = 0.0;
+    XY start_mm;
+    XY direction;
     double length_mm = 0.0;
     double start_s = 0.0;
     double end_s = 0.0;
@@ -118,25 +117,22 @@ inline void NearPath::slide(const ReferencePath& path, double t) {
 
 // Pieces count whole, except that the first and the last are cut at t ± τ. The exact cut is
 // computed only if the nearest point is close to it.
-inline double NearPath::squared_contour_error(const ReferencePath& path, double p_x_mm,
-                                              double p_y_mm, std::size_t& nearest) {
+inline double NearPath::squared_contour_error(const ReferencePath& path, const XY& p_mm,
+                                              std::size_t& nearest) {
   const bool is_begin_cut = begins_cut();
   const bool is_end_cut = ends_cut();
   double best = std::numeric_limits<double>::infinity();
   for (std::size_t number = first_; number < end_; ++number) {
     const Span& span = spans()[number - first_];
-    const double x = p_x_mm - span.x_mm;
-    const double y = p_y_mm - span.y_mm;
-    double along = std::clamp(x * span.direction_x + y * span.direction_y, 0.0, span.length_mm);
+    const XY off_mm = p_mm - span.start_mm;
+    double along = std::clamp(dot(off_mm, span.direction), 0.0, span.length_mm);
     if (is_begin_cut && number == first_ && along < begin_bound_mm(path)) {
       along = std::max(along, begin_mm(path));
     }
     if (is_end_cut && number + 1 == end_ && along > end_bound_mm(path)) {
       along = std::min(along, end_mm(path));
     }
-    const double across_x = x - along * span.direction_x;
-    const double across_y = y - along * span.direction_y;
-    const double distance2 = across_x * across_x + across_y * across_y;
+    const double distance2 = squared(off_mm - along * span.direction);
     if (distance2 < best) {
       best = distance2;
       nearest = number;

@@ -31,8 +31,7 @@ struct NozzleStep {
   double time_s = 0.0;  // on the clock of the nozzle's reference
   double h_s = 0.0;
   dynamics::NozzleMotionXY nozzle;
-  dynamics::BaseSegment base_x;
-  dynamics::BaseSegment base_y;
+  dynamics::BaseXY base;
   // What is played now lays filament.
   bool extruding = false;
   // Distance from the path, and the line of the sliced file that is nearest to the nozzle: the
@@ -47,8 +46,7 @@ struct NozzleStep {
   // The base has ended early and rests while the reference runs on. The nozzle state is reset
   // afterwards.
   bool waiting = false;
-  double reference_x_mm = 0.0;
-  double reference_y_mm = 0.0;
+  XY reference_mm;
   std::size_t piece = 0;  // piece of the reference's path
 };
 

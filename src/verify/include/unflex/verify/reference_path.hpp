@@ -8,12 +8,13 @@
 #include <functional>
 #include <vector>
 
+#include "unflex/core/xy.hpp"
 #include "unflex/planner/planner.hpp"
 
 namespace unflex::verify {
 
 // A move of this duration that stands still.
-[[nodiscard]] planner::PlannedMove resting(double x_mm, double y_mm, double duration_s);
+[[nodiscard]] planner::PlannedMove resting(const XY& place_mm, double duration_s);
 
 // When the reference has covered how much of a move.
 struct Passage {
@@ -39,10 +40,8 @@ using MoveSource = std::function<bool(ReferenceMove&)>;
 struct PathPiece {
   double start_s = 0.0;
   double end_s = 0.0;
-  double x_mm = 0.0;  // start
-  double y_mm = 0.0;
-  double direction_x = 0.0;  // unit vector in the XY plane, or 0 0
-  double direction_y = 0.0;
+  XY start_mm;
+  XY direction;  // unit vector, or 0 0
   double length_xy_mm = 0.0;
   bool measured = false;  // deviations count here
   bool extruding = false;
@@ -80,7 +79,7 @@ class ReferencePath {
   // The machine stands still between two sections. Nothing is measured.
   void rest(double duration_s) { end_s_ += duration_s; }
   // The machine stands still, but deviations count, as after the end of the file.
-  void hold(double x_mm, double y_mm, double duration_s);
+  void hold(const XY& place_mm, double duration_s);
 
   // Pieces have numbers that stay the same when old ones are dropped.
   [[nodiscard]] std::size_t first() const { return dropped_; }

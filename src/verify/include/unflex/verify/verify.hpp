@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "unflex/core/axes.hpp"
 #include "unflex/core/error.hpp"
 #include "unflex/core/progress.hpp"
 #include "unflex/gcode/interpreter.hpp"
@@ -20,16 +21,14 @@
 
 namespace unflex::verify {
 
-struct TravelLimits {
-  double x_min_mm = -1e9;
-  double x_max_mm = 1e9;
-  double y_min_mm = -1e9;
-  double y_max_mm = 1e9;
-  // The minimum of the axis is not known. It is taken to be 0 in sections whose sliced path stays
-  // above 0.
-  bool x_min_assumed = false;
-  bool y_min_assumed = false;
+// How far an axis goes.
+struct TravelRange {
+  double min_mm = -1e9;
+  double max_mm = 1e9;
+  // The minimum is not known. It is taken to be 0 in sections whose sliced path stays above 0.
+  bool min_assumed = false;
 };
+using TravelLimits = Axes<TravelRange>;
 
 // How far the nozzle may stray in a compensated run: `times` as far as if the run had been kept, or
 // as far as the absolute limit, whichever is more. The small margins cover the different sampling
