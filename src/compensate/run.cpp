@@ -8,6 +8,7 @@
 #include "limits.hpp"
 #include "shared_motors.hpp"
 #include "unflex/core/math.hpp"
+#include "unflex/planner/plan_times.hpp"
 
 namespace unflex::compensate {
 namespace {
@@ -19,19 +20,21 @@ constexpr std::size_t kShortestCruise = 100;
 // A cruise faster than this share of the largest speed leaves the base no room to settle.
 constexpr double kRoomToSettle = 0.99;
 
-// Walks along the plan; times must not decrease from call to call.
+// r and its weight; times must not decrease from call to call.
 class Reference {
  public:
   // origin_s: when the course's own moves begin.
   Reference(const Course& course, double origin_s, const Setup& setup)
-      : parts_{course.before, course.moves, course.after},
-        last_part_(course.after.empty() ? 1 : 2),
-        travel_weight_(setup.travel_weight),
-        start_s_(origin_s) {
+      : travel_weight_(setup.travel_weight), starts_s_{origin_s} {
     for (const planner::PlannedMove& move : course.before) {
-      start_s_ -= move.duration_s();
+      starts_s_.front() -= move.duration_s();
     }
-    settle();
+    for (const Course::Moves& moves : {course.before, course.moves, course.after}) {
+      for (const planner::PlannedMove& move : moves) {
+        moves_.push_back(&move);
+        starts_s_.push_back(starts_s_.back() + move.duration_s());
+      }
+    }
   }
 
   struct Sample {
@@ -40,35 +43,18 @@ class Reference {
   };
 
   Sample at(double t) {
-    while (!is_last() && t >= start_s_ + move().duration_s()) {
-      start_s_ += move().duration_s();
-      ++index_;
-      settle();
-    }
-    const gcode::Position p = move().position_mm(t - start_s_);
-    const bool moving = t >= start_s_ && t <= start_s_ + move().duration_s();
-    return {xy_of(p), moving && move().segment.extruding() ? 1.0 : travel_weight_};
+    now_ = planner::move_at(starts_s_, t, now_);
+    const planner::PlannedMove& move = *moves_[now_];
+    const bool moving = t >= starts_s_[now_] && t <= starts_s_[now_ + 1];
+    return {xy_of(move.position_mm(t - starts_s_[now_])),
+            moving && move.segment.extruding() ? 1.0 : travel_weight_};
   }
 
  private:
-  [[nodiscard]] const planner::PlannedMove& move() const { return parts_[part_][index_]; }
-  [[nodiscard]] bool is_last() const {
-    return part_ == last_part_ && index_ + 1 == parts_[part_].size();
-  }
-  // Goes on to the first move of the next part after the last move of one.
-  void settle() {
-    if (part_ < last_part_ && index_ == parts_[part_].size()) {
-      ++part_;
-      index_ = 0;
-    }
-  }
-
-  std::array<Course::Moves, 3> parts_;
-  std::size_t last_part_;
   double travel_weight_;
-  std::size_t part_ = 0;
-  std::size_t index_ = 0;
-  double start_s_;
+  std::vector<const planner::PlannedMove*> moves_;
+  std::vector<double> starts_s_;
+  std::size_t now_ = 0;
 };
 
 std::size_t to_nodes(double time_s, double period_s) {

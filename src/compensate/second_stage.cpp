@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "unflex/dynamics/shaped.hpp"
+
 namespace unflex::compensate {
 namespace {
 
@@ -55,13 +57,9 @@ dynamics::AxisTrajectory shaped(const dynamics::AxisTrajectory& base, double h,
   dynamics::AxisTrajectory result;
   for (std::size_t k = 0; k < nodes; ++k) {
     const double t = (static_cast<double>(k) - static_cast<double>(more_before)) * h;
-    dynamics::AxisMotion sum;
-    for (const dynamics::Pulse& pulse : pulses.empty() ? kNone : pulses) {
-      const dynamics::AxisMotion motion = motion_at(base, t - pulse.time_s, h);
-      sum.position_mm += pulse.weight * motion.position_mm;
-      sum.velocity_mm_s += pulse.weight * motion.velocity_mm_s;
-      sum.accel_mm_s2 += pulse.weight * motion.accel_mm_s2;
-    }
+    const auto sum = dynamics::shaped_at<dynamics::AxisMotion>(
+        pulses.empty() ? kNone : pulses, t,
+        [&](std::size_t, double at_s) { return motion_at(base, at_s, h); });
     result.position_mm.push_back(sum.position_mm);
     result.velocity_mm_s.push_back(sum.velocity_mm_s);
     result.accel_mm_s2.push_back(sum.accel_mm_s2);

@@ -5,6 +5,8 @@
 #include <limits>
 
 #include "followed.hpp"
+#include "unflex/core/foot.hpp"
+#include "unflex/planner/plan_times.hpp"
 
 namespace unflex::emit {
 namespace {
@@ -33,9 +35,7 @@ NozzleProgress::NozzleProgress(const Run& run, const std::vector<double>& starts
   }
   std::size_t i = 0;
   const auto reference_mm = [&](double t) {
-    while (i + 1 < moves_->size() && t >= starts_s[i + 1]) {
-      ++i;
-    }
+    i = planner::move_at(starts_s, t, i);
     const PlannedMove& move = (*moves_)[i];
     const double length = path_mm_[i + 1] - path_mm_[i];
     if (t >= starts_s[i + 1] || move.length_mm <= 0.0) {
@@ -44,12 +44,10 @@ NozzleProgress::NozzleProgress(const Run& run, const std::vector<double>& starts
     return path_mm_[i] + length * move.distance_mm(std::max(t - starts_s[i], 0.0)) / move.length_mm;
   };
   const auto flow_mm_s = [&](double t) {
-    const auto after = std::upper_bound(starts_s.begin(), starts_s.end(), t);
-    const std::size_t number =
-        static_cast<std::size_t>(std::max<std::ptrdiff_t>(after - starts_s.begin() - 1, 0));
-    if (number >= moves_->size()) {
+    if (t >= starts_s.back()) {
       return 0.0;
     }
+    const std::size_t number = planner::move_at(starts_s, t);
     const PlannedMove& move = (*moves_)[number];
     return std::max(move.direction[E], 0.0) * move.velocity_mm_s(t - starts_s[number]);
   };
@@ -60,9 +58,7 @@ NozzleProgress::NozzleProgress(const Run& run, const std::vector<double>& starts
   dynamics::NozzleXY state =
       riding(nozzle, run.base->position_mm(0.0), run.base->velocity_mm_s(0.0));
   if (run.goes_on) {
-    const std::size_t first = static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(
-        std::upper_bound(starts_s.begin(), starts_s.end(), 0.0) - starts_s.begin() - 1, 0,
-        static_cast<std::ptrdiff_t>(moves_->size()) - 1));
+    const std::size_t first = planner::move_at(starts_s, 0.0);
     const PlannedMove& move = (*moves_)[first];
     const double local_s = std::clamp(-starts_s[first], 0.0, move.duration_s());
     state = riding(nozzle, xy_of(move.position_mm(local_s)),
@@ -99,7 +95,7 @@ double NozzleProgress::nearest_mm(const XY& p_mm, std::size_t move, double refer
     const double along = std::clamp(
         (dot(from_start_mm, direction) + kTowardsReference * ahead) / (1.0 + kTowardsReference),
         0.0, length);
-    const double cost = squared(from_start_mm - along * direction) +
+    const double cost = foot_at(from_start_mm, direction, along).distance2_mm2 +
                         kTowardsReference * (along - ahead) * (along - ahead);
     if (cost < best) {
       best = cost;

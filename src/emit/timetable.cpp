@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "unflex/core/math.hpp"
+#include "unflex/planner/plan_times.hpp"
 
 namespace unflex::emit {
 namespace {
@@ -20,12 +21,7 @@ constexpr double kTypicalLineS = 2e-3;
 }  // namespace
 
 Timetable::Timetable(const Run& run) : run_(&run) {
-  double t = run.lead_in_s;
-  for (const PlannedMove& move : *run.moves) {
-    starts_s_.push_back(t);
-    t += move.duration_s();
-  }
-  starts_s_.push_back(t);
+  starts_s_ = planner::starts_s(*run.moves, run.lead_in_s);
   const dynamics::BaseTrajectory& base = *run.base;
   const auto place_mm = [&](std::size_t k) {
     return map_axes([&](const auto& axis) { return axis.position_mm[k]; }, base);
@@ -36,10 +32,7 @@ Timetable::Timetable(const Run& run) : run_(&run) {
   }
 }
 
-std::size_t Timetable::move_at(double t) const {
-  const auto after = std::upper_bound(starts_s_.begin(), starts_s_.end() - 1, t);
-  return after == starts_s_.begin() ? 0 : static_cast<std::size_t>(after - starts_s_.begin()) - 1;
-}
+std::size_t Timetable::move_at(double t) const { return planner::move_at(starts_s_, t); }
 
 bool Timetable::tail_at(double t) const {
   constexpr double kRounding_s = 1e-9;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "unflex/dynamics/shaped.hpp"
+
 namespace unflex::rivals {
 namespace {
 
@@ -64,14 +66,10 @@ AxisPath shaped(const AxisPath& path, const dynamics::ShaperPulses& pulses) {
   AxisPath result;
   std::vector<std::size_t> index(pulses.size(), 0);
   for (const double t : starts_s) {
-    dynamics::BaseSegment sum;
-    for (std::size_t i = 0; i < pulses.size(); ++i) {
-      const dynamics::BaseSegment part = motion_at(path, index[i], t - pulses[i].time_s);
-      sum.position += pulses[i].weight * part.position;
-      sum.velocity += pulses[i].weight * part.velocity;
-      sum.acceleration += pulses[i].weight * part.acceleration;
-    }
-    result.push_back({t, sum});
+    result.push_back(
+        {t, dynamics::shaped_at<dynamics::BaseSegment>(pulses, t, [&](std::size_t i, double at_s) {
+           return motion_at(path, index[i], at_s);
+         })});
   }
   return result;
 }

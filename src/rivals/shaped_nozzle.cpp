@@ -1,7 +1,8 @@
 #include "unflex/rivals/shaped_nozzle.hpp"
 
 #include <algorithm>
-#include <limits>
+
+#include "unflex/dynamics/shaped.hpp"
 
 namespace unflex::rivals {
 
@@ -17,10 +18,10 @@ dynamics::NozzleMotion on_cubic(const dynamics::NozzleMotion& a, const dynamics:
 }
 
 ShapedNozzle::ShapedNozzle(const Axes<dynamics::ShaperPulses>& pulses) {
-  const auto set = [&](std::vector<Tap>& taps, const dynamics::ShaperPulses& train) {
-    for (const dynamics::Pulse& pulse :
-         train.empty() ? dynamics::ShaperPulses{{0.0, 1.0}} : train) {
-      taps.push_back({pulse});
+  const auto set = [&](Taps& taps, const dynamics::ShaperPulses& train) {
+    taps.pulses = train.empty() ? dynamics::ShaperPulses{{0.0, 1.0}} : train;
+    taps.index.assign(taps.pulses.size(), 0);
+    for (const dynamics::Pulse& pulse : taps.pulses) {
       lookahead_s_ = std::max(lookahead_s_, -pulse.time_s);
       memory_s_ = std::max(memory_s_, pulse.time_s);
     }
@@ -32,31 +33,23 @@ void ShapedNozzle::add(double time_s, const dynamics::NozzleMotionXY& unshaped) 
   samples_.push_back({time_s, unshaped});
 }
 
-double ShapedNozzle::known_until_s() const {
-  return samples_.empty() ? -std::numeric_limits<double>::infinity()
-                          : samples_.back().time_s - lookahead_s_;
-}
-
 dynamics::NozzleMotion ShapedNozzle::sum(std::size_t axis, double time_s) {
-  dynamics::NozzleMotion result;
-  for (Tap& tap : taps_[axis]) {
-    const double t = time_s - tap.pulse.time_s;
-    std::size_t i = std::max(tap.index, forgotten_) - forgotten_;
+  Taps& taps = taps_[axis];
+  const auto at = [&](std::size_t tap, double t) -> dynamics::NozzleMotion {
+    std::size_t i = std::max(taps.index[tap], forgotten_) - forgotten_;
     while (i + 1 < samples_.size() && samples_[i + 1].time_s <= t) {
       ++i;
     }
-    tap.index = i + forgotten_;
+    taps.index[tap] = i + forgotten_;
     const Sample& from = samples_[i];
-    dynamics::NozzleMotion delayed{from.nozzle[axis].position, 0.0};
-    if (t >= from.time_s && i + 1 < samples_.size()) {
-      const Sample& to = samples_[i + 1];
-      const double h = to.time_s - from.time_s;
-      delayed = on_cubic(from.nozzle[axis], to.nozzle[axis], h, (t - from.time_s) / h);
+    if (t < from.time_s || i + 1 == samples_.size()) {
+      return {from.nozzle[axis].position, 0.0};
     }
-    result.position += tap.pulse.weight * delayed.position;
-    result.velocity += tap.pulse.weight * delayed.velocity;
-  }
-  return result;
+    const Sample& to = samples_[i + 1];
+    const double h = to.time_s - from.time_s;
+    return on_cubic(from.nozzle[axis], to.nozzle[axis], h, (t - from.time_s) / h);
+  };
+  return dynamics::shaped_at<dynamics::NozzleMotion>(taps.pulses, time_s, at);
 }
 
 void ShapedNozzle::forget_before(double time_s) {

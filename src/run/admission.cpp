@@ -53,7 +53,7 @@ void Admission::admit(RunJob& job) {
   const std::size_t chances = settings_->is_timing_free() ? 2 : 1;
   std::string reason = blamed.size() >= chances ? blamed.back() : refusal(job, asked_accel_mm_s2);
   if (!reason.empty()) {
-    keep(job, std::move(reason));
+    keep_as_sliced(job, std::move(reason));
     return;
   }
   if (!settings_->is_timing_free()) {
@@ -71,7 +71,7 @@ void Admission::keep_lines(RunJob& job) {
   for (const gcode::Event& event : job.piece.events) {
     count_kept_moves(event, rules_->verify.fixed.firmware, report_->kept_moves);
   }
-  keep(job);
+  keep_as_sliced(job);
 }
 
 // Sets what the run is worked out with. Returns the largest acceleration that its plan asks for.

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "plan_walk.hpp"
+#include "unflex/planner/plan_times.hpp"
 #include "unflex/run/nozzle_motion.hpp"
 
 namespace unflex::run {
@@ -17,15 +17,15 @@ void EmissionCost::add(const std::vector<planner::PlannedMove>& original, double
   dynamics::NozzleXY optimal = start;
   dynamics::NozzleXY real = start;
   const NozzleOnBase on_base(base, model);
-  PlanWalk sliced(original);
-  PlanWalk emitted(replayed);
+  planner::PlanCursor sliced(original);
+  planner::PlanCursor emitted(replayed);
   for (std::size_t k = 0; k + 1 < base.nodes(); ++k) {
     const double t = static_cast<double>(k + 1) * h;
     on_base.advance(k, optimal);
     emitted.to(t + late_s, [&](const planner::PlannedMove& move, double from_s, double to_s) {
       advance(move, from_s, to_s, model, real);
     });
-    sliced.to(t - lead_in_s, [](const planner::PlannedMove&, double, double) {});
+    sliced.to(t - lead_in_s);
     if (sliced.at_end() || emitted.at_end()) {
       return;
     }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "unflex/dynamics/shaped.hpp"
 #include "unflex/emit/emitter.hpp"
 
 namespace unflex::run {
@@ -129,24 +130,19 @@ double NozzleFollower::change(const gcode::Shaper& next, const gcode::PressureAd
   if (stop_s == 0.0) {
     return stop_s;
   }
-  const auto after_stop =
-      [&](const dynamics::FlexibleAxis& axis, const dynamics::ShaperPulses& pulses,
-          const dynamics::NozzleState& driven, const dynamics::NozzleState& ringing,
-          const dynamics::NozzleState& rest) {
-        dynamics::NozzleState deviation = driven;
-        deviation.add(rest, -1.0);
-        dynamics::NozzleState sum = swing(axis, ringing, stop_s);
-        const auto add = [&](double weight, double since_s) {
-          sum.add(swing(axis, deviation, std::max(0.0, since_s)), weight);
-        };
-        if (pulses.empty()) {
-          add(1.0, stop_s);
-        }
-        for (const dynamics::Pulse& pulse : pulses) {
-          add(pulse.weight, stop_s - pulse.time_s);
-        }
-        return sum;
-      };
+  const auto after_stop = [&](const dynamics::FlexibleAxis& axis,
+                              const dynamics::ShaperPulses& pulses,
+                              const dynamics::NozzleState& driven,
+                              const dynamics::NozzleState& ringing,
+                              const dynamics::NozzleState& rest) {
+    dynamics::NozzleState deviation = driven;
+    deviation.add(rest, -1.0);
+    static const dynamics::ShaperPulses kNone = {{0.0, 1.0}};
+    return dynamics::shaped_at<dynamics::NozzleState>(
+        pulses.empty() ? kNone : pulses, stop_s,
+        [&](std::size_t, double since_s) { return swing(axis, deviation, std::max(0.0, since_s)); },
+        swing(axis, ringing, stop_s));
+  };
   const dynamics::NozzleXY rest = dynamics::riding(model_, base_mm_);
   const dynamics::NozzleXY ringing =
       map_axes(after_stop, model_, shaping_, driven_, ringing_, rest);

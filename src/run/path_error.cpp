@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "plan_walk.hpp"
+#include "unflex/planner/plan_times.hpp"
 #include "unflex/run/nozzle_motion.hpp"
 
 namespace unflex::run {
@@ -22,11 +22,11 @@ PathError path_error(const std::vector<planner::PlannedMove>& plan, double lead_
   PathError error;
   dynamics::NozzleXY nozzle = start;
   const NozzleOnBase on_base(base, model);
-  PlanWalk sliced(plan);
+  planner::PlanCursor sliced(plan);
   for (std::size_t k = 0; k + 1 < base.nodes() && !sliced.at_end(); ++k) {
     const double t = static_cast<double>(k + 1) * base.period_s - lead_in_s;
     on_base.advance(k, nozzle);
-    sliced.to(t, [](const planner::PlannedMove&, double, double) {});
+    sliced.to(t);
     if (t > 0.0 && !sliced.at_end() && sliced.move().segment.extruding()) {
       const double away_mm = across_mm(sliced.move().segment,
                                        dynamics::place_mm(nozzle) - xy_of(sliced.position_mm()));

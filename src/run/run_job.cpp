@@ -187,7 +187,7 @@ std::vector<compensate::RunWindow> windows_of(const RunJob& job, std::size_t fir
                              job.setup);
 }
 
-void keep(RunJob& job, std::string reason) {
+void keep_as_sliced(RunJob& job, std::string reason) {
   job.failure = std::move(reason);
   job.stage = Stage::lined;
 }

@@ -76,7 +76,7 @@ void work_out(RunJob& run, Remedy remedy, const RunRules& rules) noexcept try {
   solve(run, rules);
 } catch (const std::exception& exception) {
   // Out of memory, mostly.
-  keep(run, exception.what());
+  keep_as_sliced(run, exception.what());
 }
 
 }  // namespace unflex::run

@@ -5,6 +5,8 @@
 #include <limits>
 #include <numbers>
 
+#include "unflex/core/foot.hpp"
+
 namespace unflex::study {
 
 double reach_of(double slowest_rad_s) {
@@ -47,9 +49,8 @@ ContourGauge::Reading ContourGauge::measure(double time_s, const XY& place_mm) {
   double best2 = std::numeric_limits<double>::infinity();
   for (std::size_t i = first_; i < end_; ++i) {
     const Edge& edge = edges_[i];
-    const XY from_start_mm = place_mm - edge.from_mm;
-    const double along_mm = std::clamp(dot(from_start_mm, edge.direction), 0.0, edge.length_mm);
-    best2 = std::min(best2, squared(from_start_mm - along_mm * edge.direction));
+    best2 = std::min(
+        best2, foot_on(place_mm - edge.from_mm, edge.direction, edge.length_mm).distance2_mm2);
   }
   return {std::sqrt(best2), edges_[current_].extruding};
 }

@@ -27,6 +27,7 @@
 #include "nozzle_measure.hpp"
 #include "pieces.hpp"
 #include "unflex/core/math.hpp"
+#include "unflex/planner/plan_times.hpp"
 #include "unflex/timing/timing.hpp"
 
 namespace unflex::timing {
@@ -301,10 +302,7 @@ class LocalScaling {
       return std::nullopt;
     }
     period_s_ = grid.period_s;
-    starts_s_ = {compensate::origin_s(course, grid, setup_)};
-    for (const planner::PlannedMove& move : plan) {
-      starts_s_.push_back(starts_s_.back() + move.duration_s());
-    }
+    starts_s_ = planner::starts_s(plan, compensate::origin_s(course, grid, setup_));
     NozzleMeasure measured = measure(plan, bounds, starts_s_, *base, models_, allowances_,
                                      course.before.empty() ? &nozzle_ : nullptr, extruder_);
     if (!course.after.empty() || goal_ == Goal::feed) {

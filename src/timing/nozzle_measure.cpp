@@ -6,8 +6,10 @@
 #include <optional>
 
 #include "laid_width.hpp"
+#include "unflex/core/foot.hpp"
 #include "unflex/core/math.hpp"
 #include "unflex/core/xy.hpp"
+#include "unflex/planner/plan_times.hpp"
 
 namespace unflex::timing {
 namespace {
@@ -102,9 +104,7 @@ class Walk {
         if (t < starts_s_.front() || t > starts_s_.back()) {
           continue;
         }
-        while (now_ + 1 < plan_.size() && starts_s_[now_ + 1] <= t) {
-          ++now_;
-        }
+        now_ = planner::move_at(starts_s_, t, now_);
         look.now = now_;
         look.reference_mm = from_mm_[now_] + plan_[now_].distance_mm(t - starts_s_[now_]);
       }
@@ -239,15 +239,13 @@ class Walk {
     const auto look_at = [&](std::size_t i) {
       const XY direction = xy_of(plan_[i].direction);
       const XY from_start = at_mm - xy_of(plan_[i].segment.start_mm);
-      const double along =
-          std::clamp(dot(from_start, direction) * inverse_flat2_[i], 0.0, plan_[i].length_mm);
-      const double distance2 = squared(from_start - along * direction);
-      const double ahead_mm = from_mm_[i] + along - reference_mm;
-      const double cost = distance2 + kTowardsReference * ahead_mm * ahead_mm;
-      nearest2 = std::min(nearest2, distance2);
+      const Foot foot = foot_on(from_start, direction, plan_[i].length_mm, inverse_flat2_[i]);
+      const double ahead_mm = from_mm_[i] + foot.along_mm - reference_mm;
+      const double cost = foot.distance2_mm2 + kTowardsReference * ahead_mm * ahead_mm;
+      nearest2 = std::min(nearest2, foot.distance2_mm2);
       if (cost < least) {
         least = cost;
-        found.progress_mm = from_mm_[i] + along;
+        found.progress_mm = from_mm_[i] + foot.along_mm;
         found.piece = i;
       }
     };

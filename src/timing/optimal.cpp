@@ -7,6 +7,7 @@
 #include "section_motion.hpp"
 #include "sections.hpp"
 #include "timed_moves.hpp"
+#include "unflex/planner/plan_times.hpp"
 #include "unflex/timing/timing.hpp"
 
 namespace unflex::timing {
@@ -251,10 +252,7 @@ const char* broken_by(const Timed& timed, std::span<const MoveBounds> bounds,
   for (std::size_t i = 0; i < timed.pieces.size(); ++i) {
     of_pieces.insert(of_pieces.end(), timed.pieces[i], bounds[i]);
   }
-  std::vector<double> starts_s = {setup.lead_in_s};
-  for (const planner::PlannedMove& move : timed.moves) {
-    starts_s.push_back(starts_s.back() + move.duration_s());
-  }
+  const std::vector<double> starts_s = planner::starts_s(timed.moves, setup.lead_in_s);
   const NozzleMeasure measured = measure(timed.moves, of_pieces, starts_s, *timed.base,
                                          models_of(setup), {}, &nozzle, extruder);
   constexpr double kMoreError = 0.03;

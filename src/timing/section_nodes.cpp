@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "unflex/core/foot.hpp"
 #include "unflex/core/math.hpp"
 
 namespace unflex::timing {
@@ -83,8 +84,8 @@ SectionNodes::Range SectionNodes::legs(std::size_t k, double x) const {
 }
 
 double SectionNodes::along_mm(std::size_t leg, XY nozzle) const {
-  return std::clamp(dot(nozzle - start_of(legs_[leg]), direction_of(legs_[leg])), 0.0,
-                    legs_[leg].move.length_mm);
+  return foot_on(nozzle - start_of(legs_[leg]), direction_of(legs_[leg]), legs_[leg].move.length_mm)
+      .along_mm;
 }
 
 double SectionNodes::distance_mm(std::size_t leg, XY nozzle) const {

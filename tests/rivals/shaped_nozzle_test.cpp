@@ -89,7 +89,7 @@ TEST(ShapedNozzle, IsTheNozzleOnTheShapedBase) {
     std::size_t next = 0;
     for (std::size_t k = 0; k < grid.count; ++k) {
       nozzle.add(grid.at(k), {plain_x[k].motion(), plain_y[k].motion()});
-      for (; next < grid.count && grid.at(next) <= nozzle.known_until_s(); ++next) {
+      for (; next < grid.count && grid.at(next) <= grid.at(k) - nozzle.lookahead_s(); ++next) {
         const dynamics::NozzleMotionXY at = nozzle.at(grid.at(next));
         EXPECT_NEAR(at.x.position, shaped_x[next].position(), 1e-6) << dynamics::name(kind);
         EXPECT_NEAR(at.y.position, shaped_y[next].position(), 1e-6) << dynamics::name(kind);

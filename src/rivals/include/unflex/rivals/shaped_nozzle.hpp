@@ -36,14 +36,12 @@ class ShapedNozzle {
   // Hz and 10 000 mm/s²). Before the first sample it rests at that sample.
   void add(double time_s, const dynamics::NozzleMotionXY& unshaped);
 
-  // The samples given so far determine the shaped nozzle up to this time, which is lookahead_s()
-  // before the last sample.
-  [[nodiscard]] double known_until_s() const;
+  // The samples given so far determine the shaped nozzle up to this long before the last of them.
   [[nodiscard]] double lookahead_s() const { return lookahead_s_; }
 
-  // The shaped nozzle's state at a time up to known_until_s(). For a later time the unshaped nozzle
-  // is taken to rest at the last sample. Times must not decrease from call to call, because samples
-  // that no later time needs are forgotten.
+  // The shaped nozzle's state at a time. For one that the samples do not determine yet, the
+  // unshaped nozzle is taken to rest at the last sample. Times must not decrease from call to call,
+  // because samples that no later time needs are forgotten.
   [[nodiscard]] dynamics::NozzleMotionXY at(double time_s);
 
  private:
@@ -51,15 +49,15 @@ class ShapedNozzle {
     double time_s;
     dynamics::NozzleMotionXY nozzle;
   };
-  struct Tap {
-    dynamics::Pulse pulse;
-    std::size_t index = 0;  // number of the sample at or before the delayed time
+  struct Taps {
+    dynamics::ShaperPulses pulses;
+    std::vector<std::size_t> index;  // for each, the sample at or before the delayed time
   };
 
   [[nodiscard]] dynamics::NozzleMotion sum(std::size_t axis, double time_s);
   void forget_before(double time_s);
 
-  Axes<std::vector<Tap>> taps_;
+  Axes<Taps> taps_;
   double lookahead_s_ = 0.0;
   double memory_s_ = 0.0;
   std::deque<Sample> samples_;

@@ -149,7 +149,7 @@ struct RunRules {
 [[nodiscard]] AxisResult axis_result(Result<compensate::AxisSolution> solution);
 
 // There is nothing to work out: the piece is written as it is, for this reason if it is a run.
-void keep(RunJob& job, std::string reason = {});
+void keep_as_sliced(RunJob& job, std::string reason = {});
 
 // The run keeps its timing as sliced.
 void keep_timing(RunJob& job, std::string reason);

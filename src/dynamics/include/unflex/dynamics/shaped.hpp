@@ -1,0 +1,41 @@
+// What an input shaper makes of a motion m: Σ A_i m(t − t_i), with the pulses' weights A_i and
+// times t_i.
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+#include "unflex/dynamics/base_trajectory.hpp"
+#include "unflex/dynamics/flexible_axis.hpp"
+#include "unflex/dynamics/shapers.hpp"
+
+namespace unflex::dynamics {
+
+// Adds `times` the other motion.
+inline void add(AxisMotion& sum, const AxisMotion& other, double times) {
+  sum.position_mm += times * other.position_mm;
+  sum.velocity_mm_s += times * other.velocity_mm_s;
+  sum.accel_mm_s2 += times * other.accel_mm_s2;
+}
+inline void add(BaseSegment& sum, const BaseSegment& other, double times) {
+  sum.position += times * other.position;
+  sum.velocity += times * other.velocity;
+  sum.acceleration += times * other.acceleration;
+}
+inline void add(NozzleMotion& sum, const NozzleMotion& other, double times) {
+  sum.position += times * other.position;
+  sum.velocity += times * other.velocity;
+}
+inline void add(NozzleState& sum, const NozzleState& other, double times) { sum.add(other, times); }
+
+// The shaped motion at time t. at(i, t): the motion at time t, asked for the i-th pulse. sum: what
+// there is besides.
+template <typename Motion, typename At>
+[[nodiscard]] Motion shaped_at(std::span<const Pulse> pulses, double t, At&& at, Motion sum = {}) {
+  for (std::size_t i = 0; i < pulses.size(); ++i) {
+    add(sum, at(i, t - pulses[i].time_s), pulses[i].weight);
+  }
+  return sum;
+}
+
+}  // namespace unflex::dynamics
