@@ -85,8 +85,9 @@ void measure_robustness(RunJob& job, const verify::NozzleModel& model) {
   }
   if (const std::optional<dynamics::BaseTrajectory> nominal = nominal_base(job)) {
     const std::vector<planner::PlannedMove>& plan = job.reference();
-    job.robustness.robust = path_error(plan, job.lead_in_s(), job.base, job.nozzle, model);
-    job.robustness.nominal = path_error(plan, job.lead_in_s(), *nominal, job.nozzle, model);
+    const double lead_in_s = job.lead_in_s();
+    job.robustness.robust = path_error({plan, lead_in_s, job.base, job.nozzle}, model);
+    job.robustness.nominal = path_error({plan, lead_in_s, *nominal, job.nozzle}, model);
   }
 }
 

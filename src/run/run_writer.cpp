@@ -193,8 +193,8 @@ std::string RunWriter::finish() {
   report_->extruded_path = path_.path();
   report_->unknown_commands = path_.unknown_commands();
   report_->line_budget.max_lines_per_s = max_lines_per_s_;
-  report_->line_budget.cost_rms_mm = cost_.rms_mm();
-  report_->line_budget.cost_max_mm = cost_.max_mm();
+  report_->line_budget.cost_rms_mm = emission_.rms_mm();
+  report_->line_budget.cost_max_mm = emission_.max_mm;
   if (rules_->setup.is_robust()) {
     report_->robustness = {robust_.rms_mm(), nominal_.rms_mm()};
   }
@@ -344,8 +344,8 @@ std::optional<std::string> RunWriter::try_run(const RunJob& job, const emit::Run
   }
   sliced_s_ += planner::duration_s(piece.moves);
   written_s_ += planner::duration_s(verdict.replayed) + switching_s_;
-  cost_.add(job.reference(), job.lead_in_s(), job.base, verdict.replayed, verdict.wait_s,
-            run_nozzle_, rules_->verify.nozzle);
+  add_emission_error({job.reference(), job.lead_in_s(), job.base, run_nozzle_}, verdict.replayed,
+                     verdict.wait_s, rules_->verify.nozzle, emission_);
   robust_.add(job.robustness.robust);
   nominal_.add(job.robustness.nominal);
   late_s_ += planner::duration_s(verdict.replayed) - planner::duration_s(job.reference()) -

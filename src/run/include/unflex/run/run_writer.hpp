@@ -10,9 +10,9 @@
 #include "unflex/core/error.hpp"
 #include "unflex/emit/emitter.hpp"
 #include "unflex/report/report.hpp"
-#include "unflex/run/emission_cost.hpp"
 #include "unflex/run/extruded_path.hpp"
 #include "unflex/run/nozzle_motion.hpp"
+#include "unflex/run/path_error.hpp"
 #include "unflex/run/run_job.hpp"
 #include "unflex/run/run_tries.hpp"
 #include "unflex/verify/line_rate.hpp"
@@ -89,7 +89,7 @@ class RunWriter {
   std::size_t run_line_ = 0;                   // first line of the run at hand
   std::optional<verify::BlamedRun> blocked_;
   ExtrudedPath path_;
-  EmissionCost cost_;
+  PathError emission_;
   PathError robust_;
   PathError nominal_;
   double sliced_s_ = 0.0;   // sliced duration of what has been written
