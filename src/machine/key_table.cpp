@@ -1,246 +1,22 @@
 #include "key_table.hpp"
 
+#include <algorithm>
 #include <array>
-#include <limits>
 
-#include "unflex/dynamics/shapers.hpp"
+#include "keys_of_printer.hpp"
 
 namespace unflex::machine {
 namespace {
 
-constexpr Bounds kAny{};
-constexpr Bounds kNotNegative{.min = 0.0};
-constexpr Bounds kPositive{.min = 0.0, .min_open = true};
-
-// Members of the settings' sections, and of the form of an axis as mass, spring and damper.
-template <auto Section, auto Field>
-auto& setting(Draft& draft) {
-  return draft.settings.*Section.*Field;
-}
-
-// axis: as in Axes.
-template <auto Member, std::size_t Axis, auto Field>
-auto& axis_setting(Draft& draft) {
-  return (draft.settings.*Member)[Axis].*Field;
-}
-
-template <std::size_t Axis, auto Field>
-auto& mass_form(Draft& draft) {
-  return draft.mass[Axis].*Field;
-}
-
-template <double (Settings::*Derived)() const>
-double derived(const Settings& settings) {
-  return (settings.*Derived)();
-}
-
-template <auto Section, auto Field, std::size_t Index>
-auto& of_axis(Draft& draft) {
-  return (draft.settings.*Section.*Field)[Index];
-}
-
-template <auto Derived, std::size_t Index>
-double derived_of_axis(const Settings& settings) {
-  return (settings.*Derived)()[Index];
-}
-
-// Infinity, which no key takes, stands for a value that is not known.
-template <std::size_t Axis>
-double known_shaper(const Settings& settings) {
-  return settings.shaper_unknown()[Axis] ? std::numeric_limits<double>::infinity()
-                                         : settings.shaper_freq_hz()[Axis];
-}
-
-using S = Settings;
-using P = PrinterSettings;
-using L = LimitSettings;
-using E = ExtruderSettings;
-using W = PressureSettings;
-using H = HotendSettings;
-using D = AxisDynamics;
-using N = SecondSettings;
-using K = KinematicsSettings;
-using R = DynamicsError;
-using M = MassSpringDamper;
-using B = BaseSettings;
-using O = SolveSettings;
-using T = EmitSettings;
-using F = TimingSettings;
-using V = VerifySettings;
+using namespace key_rows;
 
 constexpr std::array<std::string_view, 4> kPressureShapes = {kLinearPressure, "two_slopes", "tanh",
                                                              "reciprocal"};
-constexpr std::string_view kNotLimited = "not limited";
-constexpr std::string_view kOtherForm = "not used";
-constexpr std::string_view kNotKnown = "not known";
-// Klipper's shaper_defs.py and RepRapFirmware's AxisShaper.h. Not "custom", whose impulses are no
-// key: such a shaper has to be set by the file's own M593.
-constexpr std::array<std::string_view, 11> kShaperTypes = {
-    "auto", "zv", "mzv", "zvd", "zvdd", "zvddd", "ei", "2hump_ei", "3hump_ei", "ei2", "ei3"};
-bool is_mzv(std::string_view text) { return dynamics::mzv_form(text).has_value(); }
-
-// The variants that variants.cpp knows, besides "auto" and "mainline".
-constexpr std::array<std::string_view, 8> kVariants = {
-    "auto",          "mainline",    "kalico",       "kalico_limited",
-    "kalico_smooth", "prusa_buddy", "snapmaker_j1", "marlin_1_0"};
 constexpr std::array<std::string_view, 2> kTimingMethods = {kScaled, kOptimal};
 constexpr std::array<std::string_view, 2> kAheadWhen = {"heating", "both"};
 constexpr std::array<std::string_view, 5> kSecondShapers = {"zv", "mzv", "zvd", "ei", "none"};
-// The presets that step_limits.cpp knows.
-constexpr std::array<std::string_view, 4> kDrivers = {"", "a4988", "drv8825", "tmc2209"};
-constexpr std::array<std::string_view, 6> kMcus = {"",          "avr_16mhz", "lpc1768",
-                                                   "stm32f103", "stm32f4",   "sam3x"};
-constexpr std::array<std::string_view, 4> kTransports = {"auto", "card", "serial", "sbc"};
 
-constexpr std::array kKeys = {
-    Key{"printer.firmware", &setting<&S::printer, &P::firmware>, kAny, "",
-        "Firmware that runs the output"},
-    Key{"printer.variant",
-        &setting<&S::printer, &P::variant>,
-        kAny,
-        "",
-        "The firmware's variant; auto: as unflex recognises it, mainline: the makers' own",
-        {},
-        nullptr,
-        kVariants},
-    Key{"printer.version", &setting<&S::printer, &P::version>, kAny, "",
-        "The firmware's version as it tells it, such as \"v0.13.0-700-g0123abcd\" or \"3.6.0\"; "
-        "\"\": not "
-        "known"},
-    Key{"printer.transport",
-        &setting<&S::printer, &P::transport>,
-        kAny,
-        "",
-        "How lines reach the firmware: from its card or Klipper's virtual_sdcard, by USB from a "
-        "host, by RRF's SBC; auto: card",
-        {},
-        nullptr,
-        kTransports},
-    Key{"printer.travel_x_mm", &of_axis<&S::printer, &P::travel_mm, 0>, kAny, "mm",
-        "The base's travel along X, [min, max]", kNotLimited},
-    Key{"printer.travel_y_mm", &of_axis<&S::printer, &P::travel_mm, 1>, kAny, "mm",
-        "The base's travel along Y, [min, max]", kNotLimited},
-    Key{"printer.relative_extrusion", &setting<&S::printer, &P::relative_extrusion>, kAny, "",
-        "E words are differences before the file's first M82 or M83, since a start macro or "
-        "config.g has M83"},
-    Key{"printer.firmware_retraction", &setting<&S::printer, &P::firmware_retraction>, kAny, "",
-        "G10 and G11 move filament. Klipper: [firmware_retraction]; Marlin: FWRETRACT"},
-    Key{"printer.retract_length_mm", &setting<&S::printer, &P::retract_length_mm>, kNotNegative,
-        "mm", "Filament G10 pulls back", "Klipper 0, Marlin 3, RRF 2",
-        &derived<&S::retract_length_mm>},
-    Key{"printer.retract_speed_mm_s", &setting<&S::printer, &P::retract_speed_mm_s>,
-        Bounds{.min = 1.0}, "mm/s", "Speed of G10", "Klipper 20, Marlin 45, RRF 16.7",
-        &derived<&S::retract_speed_mm_s>},
-    Key{"printer.unretract_extra_length_mm", &setting<&S::printer, &P::unretract_extra_length_mm>,
-        kAny, "mm", "Filament G11 pushes beyond what G10 pulled; below 0 not on Klipper"},
-    Key{"printer.unretract_speed_mm_s", &setting<&S::printer, &P::unretract_speed_mm_s>,
-        Bounds{.min = 1.0}, "mm/s", "Speed of G11", "Klipper 10, Marlin 8, RRF 16.7",
-        &derived<&S::unretract_speed_mm_s>},
-    Key{"printer.retract_z_hop_mm", &setting<&S::printer, &P::retract_z_hop_mm>, kNotNegative, "mm",
-        "How far G10 lifts Z. Marlin: RETRACT_ZRAISE, M207 Z; RRF: M207 Z"},
-    Key{"printer.arc_resolution_mm", &setting<&S::printer, &P::arc_resolution_mm>, kPositive, "mm",
-        "Klipper: [gcode_arcs] resolution, length of the chords the printer draws arcs with"},
-    Key{"printer.min_arc_segment_mm", &setting<&S::printer, &P::min_arc_segment_mm>, kPositive,
-        "mm", "Marlin: MIN_ARC_SEGMENT_MM"},
-    Key{"printer.max_arc_segment_mm", &setting<&S::printer, &P::max_arc_segment_mm>, kPositive,
-        "mm", "Marlin: MAX_ARC_SEGMENT_MM"},
-    Key{"printer.arc_segments_per_s", &setting<&S::printer, &P::arc_segments_per_s>, kNotNegative,
-        "1/s", "Marlin: ARC_SEGMENTS_PER_SEC; 0 where it is not defined"},
-    Key{"printer.min_circle_segments", &setting<&S::printer, &P::min_circle_segments>,
-        Bounds{.min = 1.0, .max = 1000.0}, "", "Marlin: MIN_CIRCLE_SEGMENTS"},
-    Key{"printer.arc_correction_interval", &setting<&S::printer, &P::arc_correction_interval>,
-        Bounds{.min = 1.0, .max = 255.0}, "", "Marlin: N_ARC_CORRECTION"},
-    Key{"printer.arc_p_circles", &setting<&S::printer, &P::arc_p_circles>, kAny, "",
-        "Marlin: ARC_P_CIRCLES"},
-    Key{"printer.ft_motion", &setting<&S::printer, &P::ft_motion>, kAny, "",
-        "Marlin: fixed-time motion is on (M493 S1)"},
-    Key{"printer.linear_advance_s", &setting<&S::printer, &P::linear_advance_s>, kNotNegative, "s",
-        "Marlin: M900 K; 0 where LIN_ADVANCE is not built in"},
-    Key{"printer.x_steps_per_mm", &of_axis<&S::printer, &P::steps_per_mm, 0>, kPositive, "1/mm",
-        "Marlin, RRF: M92 X; Klipper: of [stepper_x]", "80", &derived_of_axis<&S::steps_per_mm, 0>},
-    Key{"printer.y_steps_per_mm", &of_axis<&S::printer, &P::steps_per_mm, 1>, kPositive, "1/mm",
-        "Marlin, RRF: M92 Y; Klipper: of [stepper_y]", "80", &derived_of_axis<&S::steps_per_mm, 1>},
-    Key{"printer.z_steps_per_mm", &of_axis<&S::printer, &P::steps_per_mm, 2>, kPositive, "1/mm",
-        "Marlin, RRF: M92 Z; Klipper: of [stepper_z]", "Marlin 400, RRF 800",
-        &derived_of_axis<&S::steps_per_mm, 2>},
-    Key{"printer.e_steps_per_mm", &of_axis<&S::printer, &P::steps_per_mm, 3>, kPositive, "1/mm",
-        "Marlin, RRF: M92 E; Klipper: of [extruder]", "Marlin 500, RRF 420",
-        &derived_of_axis<&S::steps_per_mm, 3>},
-    Key{"printer.max_step_rate_hz", &setting<&S::printer, &P::max_step_rate_hz>, kNotNegative, "Hz",
-        "Steps per second that each motor can be made to do; 0: no limit"},
-    Key{"printer.max_total_step_rate_hz", &setting<&S::printer, &P::max_total_step_rate_hz>,
-        kNotNegative, "Hz", "Steps per second of all motors together; 0: no limit"},
-    Key{"printer.driver",
-        &setting<&S::printer, &P::driver>,
-        kAny,
-        "",
-        "The motors' driver, whose shortest pulse limits each motor",
-        {},
-        nullptr,
-        kDrivers},
-    Key{"printer.mcu",
-        &setting<&S::printer, &P::mcu>,
-        kAny,
-        "",
-        "The board's processor, which limits one motor and several together",
-        {},
-        nullptr,
-        kMcus},
-    Key{"printer.classic_jerk", &setting<&S::printer, &P::classic_jerk>, kAny, "",
-        "Marlin: CLASSIC_JERK instead of junction deviation"},
-    Key{"printer.min_steps_per_segment", &setting<&S::printer, &P::min_steps_per_segment>,
-        Bounds{.min = 1.0, .max = 1000.0}, "", "Marlin: MIN_STEPS_PER_SEGMENT"},
-    Key{"printer.jd_handle_small_segments", &setting<&S::printer, &P::jd_handle_small_segments>,
-        kAny, "", "Marlin: JD_HANDLE_SMALL_SEGMENTS"},
-    Key{"printer.minimum_planner_speed_mm_s", &setting<&S::printer, &P::minimum_planner_speed_mm_s>,
-        Bounds{.min = 0.0, .max = 10.0, .min_open = true}, "mm/s", "Marlin: MINIMUM_PLANNER_SPEED"},
-    Key{"printer.queue_length", &setting<&S::printer, &P::queue_length>,
-        Bounds{.min = 4.0, .max = 1000.0}, "",
-        "Moves planned ahead. Marlin: BLOCK_BUFFER_SIZE; RRF: the ring's length",
-        "Marlin 16, RRF 60", &derived<&S::queue_length>},
-    Key{"printer.step_clock_hz", &setting<&S::printer, &P::step_clock_hz>,
-        Bounds{.min = 1e5, .max = 1e8}, "Hz",
-        "RRF: StepClockRate, 750000 on a Duet 3, 937500 on a Duet 2"},
-    Key{"printer.input_shaper_freq_x_hz", &of_axis<&S::printer, &P::input_shaper_freq_hz, 0>,
-        kNotNegative, "Hz",
-        "What the printer's own [input_shaper] is set back to after the print; 0 if it has none",
-        "not known", &known_shaper<0>},
-    Key{"printer.input_shaper_freq_y_hz", &of_axis<&S::printer, &P::input_shaper_freq_hz, 1>,
-        kNotNegative, "Hz",
-        "What the printer's own [input_shaper] is set back to after the print; 0 if it has none",
-        "not known, RRF printer.input_shaper_freq_x_hz", &known_shaper<1>},
-    Key{"printer.input_shaper_type",
-        &of_axis<&S::printer, &P::input_shaper_type, 0>,
-        kAny,
-        "",
-        "Type of the printer's own shaper as the firmware spells it, Klipper's mzv(n=4,t=0.9) too; "
-        "auto: Klipper mzv, Marlin zv, RRF zvd",
-        {},
-        nullptr,
-        kShaperTypes,
-        false,
-        &is_mzv},
-    Key{"printer.input_shaper_type_y",
-        &of_axis<&S::printer, &P::input_shaper_type, 1>,
-        kAny,
-        "",
-        "Klipper: type of the printer's own shaper along Y; auto: as along X",
-        {},
-        nullptr,
-        kShaperTypes,
-        false,
-        &is_mzv},
-    Key{"printer.input_shaper_damping_ratio_x",
-        &of_axis<&S::printer, &P::input_shaper_damping_ratio, 0>,
-        Bounds{.min = 0.0, .max = 1.0, .max_open = true}, "",
-        "The damping ratio that the printer's own shaper is built for", "0.1, Marlin 0.15",
-        &derived_of_axis<&S::shaper_damping_ratio, 0>},
-    Key{"printer.input_shaper_damping_ratio_y",
-        &of_axis<&S::printer, &P::input_shaper_damping_ratio, 1>,
-        Bounds{.min = 0.0, .max = 1.0, .max_open = true}, "",
-        "The damping ratio that the printer's own shaper is built for", "0.1, Marlin 0.15",
-        &derived_of_axis<&S::shaper_damping_ratio, 1>},
-
+constexpr std::array kOtherKeys = {
     Key{"limits.max_velocity_mm_s", &setting<&S::limits, &L::max_velocity_mm_s>, kPositive, "mm/s",
         "Klipper: [printer] max_velocity; the others: the larger of X and Y"},
     Key{"limits.max_accel_mm_s2", &setting<&S::limits, &L::max_accel_mm_s2>, kPositive, "mm/s²",
@@ -626,6 +402,17 @@ constexpr std::array kKeys = {
     Key{"verify.hold_s", &setting<&S::verify, &V::hold_s>, Bounds{.min = 0.0, .max = 10.0}, "s",
         "How long the nozzle is watched after the last move"},
 };
+
+template <std::size_t A, std::size_t B>
+constexpr std::array<Key, A + B> joined(const std::array<Key, A>& first,
+                                        const std::array<Key, B>& then) {
+  std::array<Key, A + B> all{};
+  std::ranges::copy(first, all.begin());
+  std::ranges::copy(then, all.begin() + A);
+  return all;
+}
+
+constexpr std::array kKeys = joined(kPrinterKeys, kOtherKeys);
 
 }  // namespace
 

@@ -10,8 +10,7 @@
 // The extruder follows where speeds change slowly enough, so w makes accelerations smaller. A
 // nozzle that becomes slower at a vertex would not help it.
 //
-// A run that keeps its timing only becomes slower where its nozzle runs ahead of F: V alone
-// changes.
+// In a run that keeps its timing V alone changes, where the nozzle runs ahead of F.
 //
 // The exponents become smaller from round to round. Once the plan's time hardly changes, limits are
 // lowered only, until the nozzle keeps the tolerance everywhere.
