@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "plain_emission.hpp"
+#include "planner/rrf_limits.hpp"
 #include "speeds.hpp"
 #include "unflex/emit/emitter.hpp"
 #include "unflex/planner/rrf_planner.hpp"
@@ -27,8 +28,8 @@ EmitOptions rrf_options() {
   how.interpreter = gcode::default_options(Firmware::rrf);
   how.fixed.firmware = Firmware::rrf;
   how.fixed.steps_per_mm = {80.0, 80.0, 400.0, 420.0};
-  how.printer_limits = planner::rrf_default_limits();
-  how.run_limits = planner::rrf_default_limits();
+  how.printer_limits = planner::testing::rrf_default_limits();
+  how.run_limits = planner::testing::rrf_default_limits();
   how.run_limits.axis_max_velocity_mm_s = {1200.0, 1200.0, 20.0, 1200.0};
   how.run_limits.axis_max_accel_mm_s2 = {1e5, 1e5, 200.0, 1e5};
   how.run_limits.axis_jerk_mm_s = {1000.0, 1000.0, 10.0, 1000.0};

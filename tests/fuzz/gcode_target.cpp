@@ -7,6 +7,7 @@
 #include <string>
 
 #include "bytes.hpp"
+#include "planner/rrf_limits.hpp"
 #include "playback.hpp"
 #include "targets.hpp"
 #include "unflex/gcode/time_note.hpp"
@@ -26,7 +27,7 @@ PrinterSetup printer_setup(std::size_t variant) {
   setup.interpreter = gcode::default_options(firmware);
   setup.fixed.firmware = firmware;
   if (firmware == Firmware::rrf) {
-    setup.limits = planner::rrf_default_limits();
+    setup.limits = planner::testing::rrf_default_limits();
   }
   if (variant >= 3) {
     setup.interpreter.firmware_retraction = !setup.interpreter.firmware_retraction;

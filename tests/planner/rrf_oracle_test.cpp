@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "planner/csv_rows.hpp"
+#include "planner/rrf_limits.hpp"
 #include "unflex/planner/rrf_planner.hpp"
 
 namespace unflex::planner {
@@ -71,7 +72,7 @@ class Run {
     config.ring_length = static_cast<int>(number(row, 2));
     config.step_clock_hz = number(row, 3);
     clock_hz_ = config.step_clock_hz;
-    planner_ = make_planner(rrf_default_limits(), config);
+    planner_ = make_planner(testing::rrf_default_limits(), config);
   }
 
   void feed(const Row& row) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "planner/plan_helpers.hpp"
+#include "planner/rrf_limits.hpp"
 
 namespace unflex::planner {
 namespace {
@@ -28,7 +29,7 @@ FirmwareConfig rrf_config() {
 }
 
 Limits fast_limits(int jerk_policy) {
-  Limits limits = rrf_default_limits();
+  Limits limits = testing::rrf_default_limits();
   limits.axis_max_velocity_mm_s = {300.0, 300.0, 20.0, 100.0};
   limits.axis_max_accel_mm_s2 = {3000.0, 3000.0, 200.0, 5000.0};
   limits.axis_jerk_mm_s = {8.0, 8.0, 2.0, 5.0};
@@ -56,7 +57,7 @@ double corner_speed(double degrees, int jerk_policy) {
 }
 
 TEST(RrfPlanner, FirmwareDefaultsAreThoseOfItsConfiguration) {
-  const Limits limits = rrf_default_limits();
+  const Limits limits = testing::rrf_default_limits();
   EXPECT_EQ(limits.axis_max_velocity_mm_s, (std::array<double, 4>{100, 100, 20, 100}));
   EXPECT_EQ(limits.axis_max_accel_mm_s2, (std::array<double, 4>{1000, 1000, 200, 500}));
   EXPECT_EQ(limits.axis_jerk_mm_s, (std::array<double, 4>{15, 15, 10, 5}));
@@ -69,7 +70,7 @@ TEST(RrfPlanner, FirmwareDefaultsAreThoseOfItsConfiguration) {
 }
 
 TEST(RrfPlanner, LoneMoveIsATrapezoidFromStandstillToStandstill) {
-  const auto moves = rrf_plan(polyline({{50, 0, 0, 0}}, 80.0), rrf_default_limits());
+  const auto moves = rrf_plan(polyline({{50, 0, 0, 0}}, 80.0), testing::rrf_default_limits());
   ASSERT_EQ(moves.size(), 1U);
   EXPECT_EQ(moves[0].start_v_mm_s, 0.0);
   EXPECT_EQ(moves[0].end_v_mm_s, 0.0);
@@ -79,7 +80,7 @@ TEST(RrfPlanner, LoneMoveIsATrapezoidFromStandstillToStandstill) {
 }
 
 TEST(RrfPlanner, ShortMoveIsATriangle) {
-  const auto moves = rrf_plan(polyline({{1, 0, 0, 0}}, 80.0), rrf_default_limits());
+  const auto moves = rrf_plan(polyline({{1, 0, 0, 0}}, 80.0), testing::rrf_default_limits());
   EXPECT_NEAR(moves.at(0).cruise_v_mm_s, std::sqrt(1000.0), 1e-4);
   EXPECT_NEAR(moves.at(0).duration_s(), 2.0 * std::sqrt(1.0 / 1000.0), 2 * kClock_s);
 }
@@ -88,7 +89,8 @@ TEST(RrfPlanner, MovesLastWholeStepClocksRoundedDown) {
   for (const double clock_hz : {750000.0, 937500.0}) {
     FirmwareConfig config = rrf_config();
     config.step_clock_hz = clock_hz;
-    const auto moves = rrf_plan(polyline({{7, 0, 0, 0}}, 30.0), rrf_default_limits(), config);
+    const auto moves =
+        rrf_plan(polyline({{7, 0, 0, 0}}, 30.0), testing::rrf_default_limits(), config);
     const double exact = clock_hz * (7.0 / 30.0 + 30.0 / 1000.0);
     const double clocks = clock_hz * moves.at(0).duration_s();
     EXPECT_NEAR(clocks, std::round(clocks), 1e-6);
@@ -103,8 +105,8 @@ TEST(RrfPlanner, From36EachPhaseIsRoundedToWholeStepClocks) {
   config.steps_per_mm = {};
   config.rounds_phases = true;
   for (const double part : {0.3, 0.7}) {
-    const auto moves =
-        rrf_plan(polyline({{7.0 + part / 25000.0, 0, 0, 0}}, 30.0), rrf_default_limits(), config);
+    const auto moves = rrf_plan(polyline({{7.0 + part / 25000.0, 0, 0, 0}}, 30.0),
+                                testing::rrf_default_limits(), config);
     EXPECT_NEAR(config.step_clock_hz * moves.at(0).duration_s(), 197500.0 + std::round(part), 1e-6);
   }
 }

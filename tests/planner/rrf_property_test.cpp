@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "planner/plan_helpers.hpp"
+#include "planner/rrf_limits.hpp"
 #include "unflex/planner/rrf_planner.hpp"
 
 namespace unflex::planner {
@@ -22,7 +23,7 @@ Limits some_limits(std::mt19937_64& random, int policy) {
   const auto uniform = [&](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random);
   };
-  Limits limits = rrf_default_limits();
+  Limits limits = testing::rrf_default_limits();
   limits.jerk_policy = policy;
   limits.axis_max_velocity_mm_s = {uniform(50, 300), uniform(50, 300), 20.0, uniform(10, 100)};
   limits.axis_max_accel_mm_s2 = {uniform(500, 9000), uniform(500, 9000), 200.0, uniform(500, 9000)};

@@ -6,6 +6,7 @@
 
 #include "planner/marlin_helpers.hpp"
 #include "planner/plan_helpers.hpp"
+#include "planner/rrf_limits.hpp"
 #include "unflex/planner/rrf_planner.hpp"
 
 namespace unflex::planner {
@@ -24,7 +25,7 @@ FirmwareConfig rrf_config() {
 }
 
 Limits fast_limits() {
-  Limits limits = rrf_default_limits();
+  Limits limits = testing::rrf_default_limits();
   limits.axis_max_velocity_mm_s = {300.0, 300.0, 20.0, 100.0};
   limits.axis_max_accel_mm_s2 = {3000.0, 3000.0, 200.0, 5000.0};
   limits.jerk_policy = 1;

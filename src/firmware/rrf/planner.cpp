@@ -30,18 +30,6 @@ std::int64_t lead(const rrf::Dda& dda, std::int64_t clock_hz) {
 
 }  // namespace
 
-Limits rrf_default_limits() {
-  Limits limits;
-  limits.axis_max_velocity_mm_s = {100.0, 100.0, 20.0, 100.0};
-  limits.axis_max_accel_mm_s2 = {1000.0, 1000.0, 200.0, 500.0};
-  limits.axis_jerk_mm_s = {15.0, 15.0, 10.0, 5.0};
-  limits.print_accel_mm_s2 = 50000.0;
-  limits.travel_accel_mm_s2 = 50000.0;
-  limits.min_movement_velocity_mm_s = 0.5;
-  limits.jerk_policy = 0;
-  return limits;
-}
-
 Limits rrf_raised(Limits limits) {
   constexpr double kMinSpeed_mm_s = 0.01;  // AbsoluteMinFeedrate
   constexpr double kMinJerk_mm_s = 0.1;    // MinimumJerk

@@ -93,11 +93,6 @@ struct Dda {
 
 }  // namespace rrf
 
-// The firmware's own limits before any M201, M203, M204 or M566 (src/Config/Configuration.h):
-//   M203 X100 Y100 Z20 E100 mm/s    M203 I0.5 mm/s     M201 X1000 Y1000 Z200 E500 mm/s²
-//   M566 X15 Y15 Z10 E5 mm/s, P0    M204 P50000 T50000 mm/s²
-[[nodiscard]] Limits rrf_default_limits();
-
 // The limits that the firmware really uses when given `limits`: it raises each to a floor
 // (src/Platform/Platform.h: SetMaxFeedrate, SetInstantDv and so on).
 [[nodiscard]] Limits rrf_raised(Limits limits);
