@@ -52,14 +52,12 @@ dynamics::AxisMotion motion_at(const dynamics::AxisTrajectory& base, double t, d
 dynamics::AxisTrajectory shaped(const dynamics::AxisTrajectory& base, double h,
                                 const dynamics::ShaperPulses& pulses, std::size_t more_before,
                                 std::size_t more_after) {
-  static const dynamics::ShaperPulses kNone = {{0.0, 1.0}};
   const std::size_t nodes = base.position_mm.size() + more_before + more_after;
   dynamics::AxisTrajectory result;
   for (std::size_t k = 0; k < nodes; ++k) {
     const double t = (static_cast<double>(k) - static_cast<double>(more_before)) * h;
     const auto sum = dynamics::shaped_at<dynamics::AxisMotion>(
-        pulses.empty() ? kNone : pulses, t,
-        [&](std::size_t, double at_s) { return motion_at(base, at_s, h); });
+        pulses, t, [&](std::size_t, double at_s) { return motion_at(base, at_s, h); });
     result.position_mm.push_back(sum.position_mm);
     result.velocity_mm_s.push_back(sum.velocity_mm_s);
     result.accel_mm_s2.push_back(sum.accel_mm_s2);

@@ -11,8 +11,6 @@
 
 namespace unflex::emit {
 
-// BaseTrajectory::x or y.
-
 // States of a nozzle of kModes modes as vectors: (q_1, q̇_1, …).
 template <int kModes>
 using ModesVector = Eigen::Matrix<double, 2 * kModes, 1>;
@@ -61,6 +59,7 @@ class StepMatrix {
 // a given state.
 class Followed {
  public:
+  // axis: its number in Axes.
   Followed(const dynamics::BaseTrajectory& base, std::size_t axis,
            const dynamics::FlexibleAxis& nozzle);
   Followed(const dynamics::BaseTrajectory& base, std::size_t axis,

@@ -33,7 +33,7 @@
 #include "unflex/dynamics/base_trajectory.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
 
-namespace unflex::emit {
+namespace unflex::emit::regulator {
 
 using dynamics::BaseTrajectory;
 using dynamics::FlexibleAxis;
@@ -58,11 +58,11 @@ inline constexpr double kAtEnd = 1e3;
 inline constexpr int kMostRounds = 200;
 inline constexpr double kSettled_mm_s = 0.02;
 inline constexpr double kPull = 0.3;
-// So many lines on either side go on with one that still changes.
-constexpr std::size_t kAround = 24;
+// How many lines on either side go on with one that still changes.
+inline constexpr std::size_t kAround = 24;
 // A change of speed may exceed its bounds by this share of their width: ADMM ends a little outside,
 // and the last line, which ends where the base does, takes what is left.
-constexpr double kOfBounds = 0.02;
+inline constexpr double kOfBounds = 0.02;
 
 struct Bounds {
   double least = 0.0;
@@ -404,4 +404,4 @@ class Regulator {
   std::vector<double> moved_;  // by the last round, mm/s
 };
 
-}  // namespace unflex::emit
+}  // namespace unflex::emit::regulator

@@ -15,6 +15,8 @@
 namespace unflex::emit {
 namespace {
 
+using namespace regulator;
+
 // `reach`, widened to where the base itself goes.
 Reach with_base(Reach reach, const BaseTrajectory& base, std::size_t axis) {
   for (std::size_t k = 0; k < base.nodes(); ++k) {

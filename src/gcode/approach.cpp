@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 
 #include "unflex/core/math.hpp"
 #include "unflex/gcode/interpreter.hpp"
@@ -64,8 +63,7 @@ std::optional<std::string> Interpreter::approach(const Line& line) const {
     return fmt::format("G4 P{:.0f}{}", std::ceil(swinging_s_ * 1e3), line_end);
   }
   const std::array<bool, 4> taken = known_or_assumed();
-  if (all_axes(std::identity{}, axes_of(state_.known)) ||
-      !all_axes(std::identity{}, axes_of(taken))) {
+  if (is_xy_known(state_.known) || !is_xy_known(taken)) {
     return std::nullopt;
   }
   const Command command = parse(line.content());

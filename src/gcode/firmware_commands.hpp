@@ -1,5 +1,5 @@
-// Which commands stop the machine, for each firmware. The lists are in klipper_commands.cpp,
-// marlin_commands.cpp and rrf_commands.cpp. Codes unknown to all three are in foreign_commands.cpp.
+// Which commands stop the machine. The lists of a firmware are in its folder in src/firmware, in
+// effects.cpp. Codes that no firmware knows are in foreign_commands.cpp.
 #pragma once
 
 #include <algorithm>

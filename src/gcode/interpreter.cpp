@@ -19,7 +19,7 @@
 namespace unflex::gcode {
 namespace {
 
-constexpr std::array<char, 4> kAxisLetters = {'X', 'Y', 'Z', 'E'};
+constexpr std::array<char, 4> kLetters = {'X', 'Y', 'Z', 'E'};
 constexpr double kMmPerInch = 25.4;
 // An event keeps room for so many segments from line to line.
 constexpr std::size_t kKeptSegments = 4;
@@ -145,7 +145,7 @@ void Interpreter::home(Event& event) {
   assumed_.fill(false);
   for (const Axis axis : kXYZ) {
     state_.known[axis] = false;
-    if (!some_named || command_.has(kAxisLetters[axis])) {
+    if (!some_named || command_.has(kLetters[axis])) {
       state_.base_mm[axis] = state_.offset_mm[axis];
       state_.base_known[axis] = true;
     }
@@ -155,7 +155,7 @@ void Interpreter::home(Event& event) {
 void Interpreter::set_position(Event& event) {
   std::array<bool, 4> named{};
   for (const Axis axis : kXYZE) {
-    const char letter = kAxisLetters[axis];
+    const char letter = kLetters[axis];
     named[axis] = command_.has(letter);
     if (named[axis] && !command_.value(letter)) {
       return not_understood(event, fmt::format("G92 with {} but no number", letter));
@@ -167,7 +167,7 @@ void Interpreter::set_position(Event& event) {
   for (const Axis axis : kXYZE) {
     if (bare || named[axis]) {
       const double scale = axis == E ? state_.filament_per_e_mm() : state_.unit_mm;
-      const double reading = bare ? 0.0 : *command_.value(kAxisLetters[axis]);
+      const double reading = bare ? 0.0 : *command_.value(kLetters[axis]);
       state_.base_mm[axis] = state_.position_mm[axis] - reading * scale;
       if (axis == E) {
         state_.e_reading_single = static_cast<float>(reading * state_.e_unit);
@@ -180,7 +180,7 @@ void Interpreter::set_position(Event& event) {
   }
   // Only RepRapFirmware stops at G92. But rewritten motion must not reach across a change of the
   // zero.
-  if (bare || any_axis(std::identity{}, axes_of(named)) || named[Z]) {
+  if (bare || named[X] || named[Y] || named[Z]) {
     event.kind = EventKind::barrier;
   }
 }
@@ -276,14 +276,14 @@ void Interpreter::limit(Event& event, char letter, double scale, double least,
 
 void Interpreter::axis_limits(Event& event, double scale, double least, AxisValues& values) {
   for (const Axis axis : kXYZE) {
-    limit(event, kAxisLetters[axis], scale, least, values[axis]);
+    limit(event, kLetters[axis], scale, least, values[axis]);
   }
 }
 
 // M92. The planner keeps the steps of its configuration, so a different value is warned of.
 void Interpreter::steps_per_mm(Event& event) {
   for (const Axis axis : kXYZE) {
-    const char letter = kAxisLetters[axis];
+    const char letter = kLetters[axis];
     const std::optional<double> steps = command_.value(letter);
     if (!steps || *steps <= 0.0 || state_.steps_per_mm[axis] == steps) {
       continue;

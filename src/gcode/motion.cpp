@@ -123,7 +123,7 @@ Target read_target(const Command& command, const ModalState& state, Firmware fir
 bool starts_known(const Target& target, const std::array<bool, 4>& known, bool in_xy_plane = true) {
   const bool e_known = known[E] || !target.named[E] || !target.e_absolute;
   const bool z_known = known[Z] || (in_xy_plane && !target.named[Z]);
-  return all_axes(std::identity{}, axes_of(known)) && z_known && e_known;
+  return is_xy_known(known) && z_known && e_known;
 }
 
 // Once an axis has been sent to an absolute reading, its position is known. True if it was unknown
@@ -260,8 +260,7 @@ void Interpreter::note_lost_motion(Event& event, const std::array<bool, 4>& know
   }
   const Target target = read_target(command_, state_, options_.firmware);
   const Position& from = state_.position_mm;
-  if (target.problem == nullptr && all_axes(std::identity{}, axes_of(known)) &&
-      target.position_mm[E] > from[E]) {
+  if (target.problem == nullptr && is_xy_known(known) && target.position_mm[E] > from[E]) {
     event.lost_path_mm = std::sqrt(squared(xy_of(target.position_mm) - xy_of(from)));
   }
 }

@@ -15,9 +15,7 @@ constexpr double kHopSpeed_mm_s = 10000.0;
 }  // namespace
 
 Interpreter::Start Interpreter::start_of_retraction() const {
-  const auto all = [](const std::array<bool, 4>& known) {
-    return all_axes(std::identity{}, axes_of(known)) && known[Z];
-  };
+  const auto all = [](const std::array<bool, 4>& known) { return is_xy_known(known) && known[Z]; };
   const bool known = all(state_.known);
   return {known, !known && all(known_or_assumed())};
 }

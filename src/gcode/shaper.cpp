@@ -39,32 +39,26 @@ std::string shaper_name(std::string_view arguments) {
 // (stepper.cpp, set_shaping_frequency). With neither X nor Y it is for both.
 void Interpreter::marlin_shaper(Event& event) {
   const Axes<bool> named{command_.has('X'), command_.has('Y')};
-  const bool names_none = !any_axis(std::identity{}, named);
-  const auto for_each_named = [&](auto&& set, auto&... of_axis) {
-    for_each_axis(
-        [&](bool is_named, auto&... value) {
-          if (is_named || names_none) {
-            set(value...);
-          }
-        },
-        named, of_axis...);
-  };
+  const Axes<bool> is_meant = any_axis(std::identity{}, named) ? named : on_all_axes(true);
   const std::optional<double> ratio = command_.value('D');
   if (ratio && *ratio >= 0.0 && *ratio <= 1.0) {
-    for_each_named([&](std::optional<double>& value) { value = ratio; },
-                   state_.shaper.damping_ratio);
+    for_each_axis(
+        [&](bool is_set, std::optional<double>& value) { value = is_set ? ratio : value; },
+        is_meant, state_.shaper.damping_ratio);
   }
   const std::optional<double> freq_hz = command_.value('F');
   if (!freq_hz || *freq_hz < 0.0) {
     return;
   }
   event.kind = EventKind::barrier;
-  for_each_named(
-      [&](bool& unknown, bool& touched, double& value_hz) {
-        unknown = touched = false;
-        value_hz = *freq_hz;
+  for_each_axis(
+      [&](bool is_set, bool& unknown, bool& touched, double& value_hz) {
+        if (is_set) {
+          unknown = touched = false;
+          value_hz = *freq_hz;
+        }
       },
-      state_.shaper_unknown, state_.shaper_touched, state_.shaper_freq_hz);
+      is_meant, state_.shaper_unknown, state_.shaper_touched, state_.shaper_freq_hz);
   note_shaper(event);
 }
 

@@ -2,10 +2,8 @@
 // in force while it is unset.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <limits>
-#include <optional>
 #include <string_view>
 
 #include "key_table.hpp"
@@ -22,7 +20,7 @@ auto& setting(Draft& draft) {
   return draft.settings.*Section.*Field;
 }
 
-// axis: as in Axes.
+// Axis, Index: the number in Axes.
 template <auto Member, std::size_t Axis, auto Field>
 auto& axis_setting(Draft& draft) {
   return (draft.settings.*Member)[Axis].*Field;

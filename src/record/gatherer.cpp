@@ -31,8 +31,7 @@ constexpr double kAtPlace = 0.05;
 constexpr std::size_t kNoPiece = std::numeric_limits<std::size_t>::max();
 
 double half_width_s(const verify::NozzleModel& model) {
-  const double slower =
-      least_of_axes([](const dynamics::FlexibleAxis& axis) { return axis.slowest_rad_s(); }, model);
+  const double slower = dynamics::slowest_rad_s(model);
   return std::clamp(kPeriods * 2.0 * std::numbers::pi / slower, kShortest_s, kLongest_s);
 }
 
@@ -322,9 +321,9 @@ std::vector<report::Place> Recorder::Gatherer::places(int number) const {
     (number == 0 ? place.before_mm : place.after_mm) = std::sqrt(candidate.contour2_mm2);
     for (std::vector<report::Moment>* moments : {&place.before, &place.after}) {
       for (report::Moment& moment : *moments) {
-        moment.reference_mm -= place.xy_mm;
-        moment.base_mm -= place.xy_mm;
-        moment.nozzle_mm -= place.xy_mm;
+        for (XY* at_mm : {&moment.reference_mm, &moment.base_mm, &moment.nozzle_mm}) {
+          *at_mm = *at_mm - place.xy_mm;
+        }
       }
     }
     result.push_back(std::move(place));

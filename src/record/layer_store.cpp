@@ -120,7 +120,8 @@ bool LayerStore::merges(const Point& point) const {
 }
 
 XY LayerStore::way(const Point& from, const Point& to) {
-  return map_axes([](std::int32_t units) { return static_cast<double>(units); }, to.at - from.at);
+  return map_axes([](std::int32_t a, std::int32_t b) { return static_cast<double>(b - a); },
+                  from.at, to.at);
 }
 
 bool LayerStore::near_chord(const Point& from, const Point& to) const {

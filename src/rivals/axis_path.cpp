@@ -171,13 +171,6 @@ NozzleWalkXY::NozzleWalkXY(const Axes<dynamics::FlexibleAxis>& axes, const Axes<
                           const AxisPath& path) { return NozzleWalk(axis, path, start_s); },
                       axes, paths)) {}
 
-dynamics::NozzleMotionXY NozzleWalkXY::motion(double t) {
-  dynamics::NozzleMotionXY result;
-  for_each_axis([&](dynamics::NozzleMotion& own, NozzleWalk& walk) { own = walk.at(t).motion(); },
-                result, walks_);
-  return result;
-}
-
 XY NozzleWalkXY::place_mm(double t) {
   XY result;
   for_each_axis([&](double& own_mm, NozzleWalk& walk) { own_mm = walk.at(t).position(); }, result,

@@ -19,8 +19,8 @@ dynamics::NozzleMotion on_cubic(const dynamics::NozzleMotion& a, const dynamics:
 
 ShapedNozzle::ShapedNozzle(const Axes<dynamics::ShaperPulses>& pulses) {
   const auto set = [&](Taps& taps, const dynamics::ShaperPulses& train) {
-    taps.pulses = train.empty() ? dynamics::ShaperPulses{{0.0, 1.0}} : train;
-    taps.index.assign(taps.pulses.size(), 0);
+    taps.pulses = train;
+    taps.index.assign(std::max<std::size_t>(train.size(), 1), 0);
     for (const dynamics::Pulse& pulse : taps.pulses) {
       lookahead_s_ = std::max(lookahead_s_, -pulse.time_s);
       memory_s_ = std::max(memory_s_, pulse.time_s);

@@ -137,9 +137,8 @@ double NozzleFollower::change(const gcode::Shaper& next, const gcode::PressureAd
                               const dynamics::NozzleState& rest) {
     dynamics::NozzleState deviation = driven;
     deviation.add(rest, -1.0);
-    static const dynamics::ShaperPulses kNone = {{0.0, 1.0}};
     return dynamics::shaped_at<dynamics::NozzleState>(
-        pulses.empty() ? kNone : pulses, stop_s,
+        pulses, stop_s,
         [&](std::size_t, double since_s) { return swing(axis, deviation, std::max(0.0, since_s)); },
         swing(axis, ringing, stop_s));
   };

@@ -13,10 +13,7 @@
 namespace unflex::study {
 namespace {
 
-double reach_s(const Nozzle& nozzle) {
-  return reach_of(least_of_axes(
-      [](const dynamics::FlexibleAxis& axis) { return axis.slowest_rad_s(); }, nozzle));
-}
+double reach_s(const Nozzle& nozzle) { return reach_of(dynamics::slowest_rad_s(nozzle)); }
 
 double gap_mm(const BaseMotion& base, const std::vector<planner::PlannedMove>& plan) {
   return most_of_axes(

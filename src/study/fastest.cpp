@@ -139,8 +139,7 @@ template <class Breaks>
 std::optional<PathErrors> measured(const std::vector<StretchPlan>& plans,
                                    const AxisShapers& shapers, const Nozzle& nozzle,
                                    const Breaks& breaks) {
-  const double reach_s = reach_of(least_of_axes(
-      [](const dynamics::FlexibleAxis& axis) { return axis.slowest_rad_s(); }, nozzle));
+  const double reach_s = reach_of(dynamics::slowest_rad_s(nozzle));
   LargestErrors largest(extruding_s(plans));
   for (const StretchPlan& plan : plans) {
     if (std::ranges::none_of(plan, [](const auto& move) { return move.segment.extruding(); })) {

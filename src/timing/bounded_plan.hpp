@@ -1,11 +1,9 @@
 // Trapezoids along a path under limits of its own at every vertex and on every move.
 #pragma once
 
-#include <cmath>
 #include <span>
 #include <vector>
 
-#include "unflex/core/axes.hpp"
 #include "unflex/core/xy.hpp"
 #include "unflex/planner/planner.hpp"
 #include "unflex/timing/timing.hpp"
@@ -14,8 +12,7 @@ namespace unflex::timing {
 
 // The speed or acceleration of the motor that moves most, |x| + |y| if the axes share motors.
 [[nodiscard]] inline double asked_of_motors(const XY& of_axes, bool shares_motors) {
-  const auto size = [](double of_axis) { return std::abs(of_axis); };
-  return shares_motors ? sum_of_axes(size, of_axes) : most_of_axes(size, of_axes);
+  return shares_motors ? taxicab(of_axes) : largest_part(of_axes);
 }
 
 // vertex_speeds_mm_s: one more than moves; the first and the last are the speeds at the ends of the

@@ -131,11 +131,8 @@ class EdgeNozzles {
     if (!section_.edge_nozzles.empty()) {
       return section_.edge_nozzles[i];
     }
-    dynamics::NozzleXY nozzle = map_axes(
-        [](const dynamics::FlexibleAxis& axis, const dynamics::BaseSegment& of_axis) {
-          return axis.riding(of_axis.position, of_axis.velocity);
-        },
-        edges_[i], base);
+    dynamics::NozzleXY nozzle =
+        dynamics::riding(edges_[i], dynamics::place_mm(base), dynamics::velocity_mm_s(base));
     if (section_.nozzle) {
       for_each_axis(
           [](dynamics::NozzleState& state, double place_mm, const dynamics::NozzleMotion& swing) {

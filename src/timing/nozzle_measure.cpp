@@ -362,23 +362,17 @@ NozzleMeasure measure(std::span<const planner::PlannedMove> plan,
   result.width.assign(base.nodes(), 0.0);
   result.speed.assign(base.nodes(), 0.0);
   Walk walk(plan, bounds, starts_s, base);
-  const Axes<dynamics::AxisMotion> begin = base.at(0.0);
+  const XY begin_mm = base.position_mm(0.0);
   Walk::Laid laid;
   std::vector<Walk::Nozzle> nozzles;
   for (std::size_t m = 0; m < models.size(); ++m) {
     const AxesModel& model = models[m];
-    dynamics::NozzleXY start = map_axes(
-        [](const dynamics::FlexibleAxis& axis, const dynamics::AxisMotion& at) {
-          return axis.riding(at.position_mm, at.velocity_mm_s);
-        },
-        model, begin);
+    dynamics::NozzleXY start = dynamics::riding(model, begin_mm, base.velocity_mm_s(0.0));
     if (nozzle != nullptr) {
-      start = map_axes(
-          [](const dynamics::FlexibleAxis& axis, const dynamics::FlexibleAxis& first,
-             const dynamics::NozzleState& state, const dynamics::AxisMotion& at) {
-            return axis.swinging_as(first, state, at.position_mm);
-          },
-          model, models.front(), *nozzle, begin);
+      start = map_axes([](const dynamics::FlexibleAxis& axis, const dynamics::FlexibleAxis& first,
+                          const dynamics::NozzleState& state,
+                          double base_mm) { return axis.swinging_as(first, state, base_mm); },
+                       model, models.front(), *nozzle, begin_mm);
     }
     nozzles.emplace_back(walk, model, start,
                          allowances.empty() ? std::span<const double>{} : allowances[m],

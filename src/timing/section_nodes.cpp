@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "unflex/core/foot.hpp"
 #include "unflex/core/math.hpp"
 
 namespace unflex::timing {
@@ -84,12 +83,7 @@ SectionNodes::Range SectionNodes::legs(std::size_t k, double x) const {
 }
 
 double SectionNodes::along_mm(std::size_t leg, XY nozzle) const {
-  return foot_on(nozzle - start_of(legs_[leg]), direction_of(legs_[leg]), legs_[leg].move.length_mm)
-      .along_mm;
-}
-
-double SectionNodes::distance_mm(std::size_t leg, XY nozzle) const {
-  return length(nozzle - start_of(legs_[leg]) - along_mm(leg, nozzle) * direction_of(legs_[leg]));
+  return timing::along_mm(legs_[leg].move, nozzle);
 }
 
 std::size_t SectionNodes::nearest_leg(std::size_t k, double x, XY nozzle) const {
@@ -97,7 +91,7 @@ std::size_t SectionNodes::nearest_leg(std::size_t k, double x, XY nozzle) const 
   std::size_t nearest = range.first;
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t leg = range.first; leg <= range.last; ++leg) {
-    const double distance = distance_mm(leg, nozzle);
+    const double distance = distance_mm(legs_[leg].move, nozzle);
     if (distance < least) {
       least = distance;
       nearest = leg;
@@ -117,7 +111,7 @@ double SectionNodes::error_mm(std::size_t k, double x, XY nozzle) const {
   }
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t leg = range.first; leg <= range.last; ++leg) {
-    least = std::min(least, distance_mm(leg, nozzle));
+    least = std::min(least, distance_mm(legs_[leg].move, nozzle));
   }
   return least;
 }

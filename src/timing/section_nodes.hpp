@@ -64,7 +64,6 @@ class SectionNodes {
   };
   // The legs between the bound vertices around u.
   [[nodiscard]] Range legs(std::size_t k, double x) const;
-  [[nodiscard]] double distance_mm(std::size_t leg, XY nozzle) const;
   void bind(const std::vector<double>& begins);
 
   std::span<const Leg> legs_;

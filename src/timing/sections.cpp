@@ -25,11 +25,9 @@ double flat_share(const planner::PlannedMove& move) { return length(xy_of(move.d
 planner::PlannedMove straight(const gcode::Position& from, const gcode::Position& to) {
   planner::PlannedMove move;
   move.length_mm = distance(xy_of(from), xy_of(to));
-  for (const gcode::Axis axis : {gcode::X, gcode::Y}) {
-    move.segment.start_mm[axis] = from[axis];
-    move.segment.end_mm[axis] = to[axis];
-    move.direction[axis] = (to[axis] - from[axis]) / move.length_mm;
-  }
+  set_xy(move.segment.start_mm, xy_of(from));
+  set_xy(move.segment.end_mm, xy_of(to));
+  set_xy(move.direction, move.segment.way_xy_mm() / move.length_mm);
   return move;
 }
 
@@ -53,13 +51,6 @@ bool are_alike(const Leg& a, const Leg& b) {
          a.tolerance_mm == b.tolerance_mm && !std::isfinite(b.entry_mm_s);
 }
 
-double distance_mm(const planner::PlannedMove& line, const gcode::Position& place) {
-  const XY from_start = xy_of(place) - xy_of(line.segment.start_mm);
-  const XY direction = xy_of(line.direction);
-  const double along = std::clamp(dot(from_start, direction), 0.0, line.length_mm);
-  return length(from_start - along * direction);
-}
-
 // Neighbours that lie on one line become one leg.
 std::vector<Leg> joined(const std::vector<Leg>& legs) {
   std::vector<Leg> result;
@@ -74,7 +65,7 @@ std::vector<Leg> joined(const std::vector<Leg>& legs) {
           straight(leg.move.segment.start_mm, legs[next].move.segment.end_mm);
       double bulge_mm = 0.0;
       for (std::size_t part = i; part < next; ++part) {
-        bulge_mm = std::max(bulge_mm, distance_mm(longer, legs[part].move.segment.end_mm));
+        bulge_mm = std::max(bulge_mm, distance_mm(longer, xy_of(legs[part].move.segment.end_mm)));
       }
       if (bulge_mm > std::min(kStraight_mm, kStraight * leg.tolerance_mm)) {
         break;

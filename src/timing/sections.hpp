@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "unflex/compensate/run.hpp"
+#include "unflex/core/foot.hpp"
 #include "unflex/core/xy.hpp"
 #include "unflex/planner/planner.hpp"
 #include "unflex/timing/timing.hpp"
@@ -29,6 +30,16 @@ struct Leg {
   double from_mm = 0.0;
   double to_mm = 0.0;
 };
+
+// How far along a line the place nearest to this one is, and how far away that is.
+[[nodiscard]] inline double along_mm(const planner::PlannedMove& line, const XY& place_mm) {
+  return foot_on(place_mm - xy_of(line.segment.start_mm), xy_of(line.direction), line.length_mm)
+      .along_mm;
+}
+[[nodiscard]] inline double distance_mm(const planner::PlannedMove& line, const XY& place_mm) {
+  return length(place_mm - xy_of(line.segment.start_mm) -
+                along_mm(line, place_mm) * xy_of(line.direction));
+}
 
 // Whether F is the same, apart from rounding and from what a slight slope takes from it.
 [[nodiscard]] bool have_same_feed(const Leg& a, const Leg& b);

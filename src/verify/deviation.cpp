@@ -46,10 +46,7 @@ double apart_mm(const NozzleXY& a, const NozzleXY& b, const NozzleModel& model) 
 }
 
 double swing_mm(const NozzleXY& nozzle, const gcode::Position& at, const NozzleModel& model) {
-  const NozzleXY resting =
-      map_axes([](const dynamics::FlexibleAxis& axis, double at_mm) { return axis.riding(at_mm); },
-               model, xy_of(at));
-  return apart_mm(nozzle, resting, model);
+  return apart_mm(nozzle, dynamics::riding(model, xy_of(at)), model);
 }
 
 RunError run_error(double contour2_mm2_s, double contour_max_mm, double duration_s, double swing_mm,

@@ -13,10 +13,7 @@ constexpr double kClockReach_s = 0.02;
 }  // namespace
 
 double reach_s(const NozzleModel& model) {
-  return kClockReach_s +
-         std::numbers::pi /
-             least_of_axes([](const dynamics::FlexibleAxis& axis) { return axis.slowest_rad_s(); },
-                           model);
+  return kClockReach_s + std::numbers::pi / dynamics::slowest_rad_s(model);
 }
 
 void NearPath::begin(const ReferencePath& path) {

@@ -20,9 +20,9 @@ namespace unflex::verify {
 // How the time of a section's emitted moves relates to that of its sliced moves.
 enum class Timing {
   kept,       // no compensated run: both files have the same moves
-  planned,    // the run lasts as long as planned
-  unplanned,  // so it does, but the firmware carries out the sliced moves in other times (Marlin)
-  free,       // the run lasts otherwise: the reference moves on as the emitted file does
+  planned,    // the run lasts as long as the sliced moves do
+  unplanned,  // the run lasts as long as planned; Marlin plays the sliced moves in other times
+  free,       // the run lasts longer or shorter; the reference moves on as the emitted file does
 };
 
 class SectionPaths {

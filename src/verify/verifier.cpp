@@ -20,8 +20,7 @@ constexpr double kLate_s = 5e-4;
 constexpr double kRingsFor_s = 1.0;
 
 double place_tolerance_mm(const Rules& rules, double base_max_accel_mm_s2) {
-  const double omega = least_of_axes(
-      [](const dynamics::FlexibleAxis& axis) { return axis.slowest_rad_s(); }, rules.nozzle);
+  const double omega = dynamics::slowest_rad_s(rules.nozzle);
   return std::max(kLeastPlaceTolerance_mm, base_max_accel_mm_s2 / (omega * omega)) +
          0.5 * rules.base_max_velocity_mm_s / rules.max_lines_per_s;
 }

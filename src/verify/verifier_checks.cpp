@@ -18,20 +18,17 @@ constexpr double kFilamentTolerance_mm = 1.5e-5 + 1e-9;
 // Type and damping of a shaper that is off are of no effect.
 // A shaper that is not known cannot be restored.
 bool same_shaper(const gcode::ModalState& a, const gcode::ModalState& b) {
-  const auto is_off = [](double freq_hz) { return freq_hz == 0.0; };
   const bool same_freqs =
       all_axes([](bool unknown, double of_a, double of_b) { return unknown || of_a == of_b; },
                a.shaper_unknown, a.shaper_freq_hz, b.shaper_freq_hz);
-  const bool same_types =
-      all_axes([&](double freq_hz, const auto& of_a,
-                   const auto& of_b) { return is_off(freq_hz) || of_a == of_b; },
-               a.shaper_freq_hz, a.shaper.type, b.shaper.type);
+  const auto is_same = [](double freq_hz, const auto& of_a, const auto& of_b) {
+    return freq_hz == 0.0 || of_a == of_b;
+  };
+  const bool same_types = all_axes(is_same, a.shaper_freq_hz, a.shaper.type, b.shaper.type);
   const bool same_damping =
-      all_axes([&](double freq_hz, const auto& of_a,
-                   const auto& of_b) { return is_off(freq_hz) || of_a == of_b; },
-               a.shaper_freq_hz, a.shaper.damping_ratio, b.shaper.damping_ratio);
-  const bool same_words =
-      all_axes(is_off, a.shaper_freq_hz) || a.shaper.custom_words == b.shaper.custom_words;
+      all_axes(is_same, a.shaper_freq_hz, a.shaper.damping_ratio, b.shaper.damping_ratio);
+  // Only a firmware with one shaper for both axes has such words.
+  const bool same_words = is_same(a.shaper_freq_hz.x, a.shaper.custom_words, b.shaper.custom_words);
   return same_freqs && same_types && same_damping && same_words;
 }
 

@@ -45,16 +45,21 @@ void set_run_limits(const FirmwareConfig& /*config*/, const RunLimits& run, Limi
   limits.accel_to_decel_mm_s2 = run.accel_mm_s2;
 }
 
+std::string shaper_line(ShaperAxes axes, const Axes<std::string>& freq_hz) {
+  std::string line = "SET_INPUT_SHAPER";
+  for_each_axis(
+      [&](std::string_view letter, bool is_set, const std::string& value) {
+        line += is_set ? fmt::format(" SHAPER_FREQ_{}={}", letter, value) : "";
+      },
+      kAxisLetters, axes, freq_hz);
+  return line;
+}
+
 void shaper_lines(const Shaper& wanted, const Shaper& /*current*/, ShaperAxes axes,
                   std::vector<std::string>& lines) {
   if (any_axis(std::identity{}, axes)) {
-    std::string line = "SET_INPUT_SHAPER";
-    for_each_axis(
-        [&](std::string_view letter, bool is_set, double freq_hz) {
-          line += is_set ? fmt::format(" SHAPER_FREQ_{}={}", letter, freq_hz) : "";
-        },
-        kAxisLetters, axes, wanted.freq_hz);
-    lines.push_back(line);
+    const auto text = [](double freq_hz) { return fmt::format("{}", freq_hz); };
+    lines.push_back(shaper_line(axes, map_axes(text, wanted.freq_hz)));
   }
 }
 
@@ -66,13 +71,7 @@ std::string advance_line(const gcode::PressureAdvance& wanted) {
 }
 
 std::string unknown_shaper_lines(ShaperAxes axes) {
-  std::string line = "SET_INPUT_SHAPER";
-  for_each_axis(
-      [&](std::string_view letter, bool is_unknown) {
-        line += is_unknown ? fmt::format(" SHAPER_FREQ_{}=...", letter) : "";
-      },
-      kAxisLetters, axes);
-  return line;
+  return shaper_line(axes, on_all_axes<std::string>("..."));
 }
 
 }  // namespace

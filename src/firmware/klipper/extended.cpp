@@ -150,8 +150,10 @@ void Interpreter::input_shaper(Event& event) {
   };
   const Axes<Parameter> freq = number("SHAPER_FREQ");
   const Axes<Parameter> damping = number("DAMPING_RATIO");
-  if (any_axis([](const Parameter& of_axis) { return of_axis.unreadable(); }, freq) ||
-      any_axis([](const Parameter& of_axis) { return of_axis.unreadable(); }, damping)) {
+  const auto is_unreadable = [](const Parameter& of_freq, const Parameter& of_damping) {
+    return of_freq.unreadable() || of_damping.unreadable();
+  };
+  if (any_axis(is_unreadable, freq, damping)) {
     event.warnings.emplace_back("SET_INPUT_SHAPER with an invalid value is ignored");
     return;
   }

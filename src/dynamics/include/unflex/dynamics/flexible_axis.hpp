@@ -217,6 +217,11 @@ class ExactMap {
   std::size_t count_ = 1;
 };
 
+// The slowest mode of all axes.
+[[nodiscard]] inline double slowest_rad_s(const Axes<FlexibleAxis>& axes) {
+  return least_of_axes([](const FlexibleAxis& axis) { return axis.slowest_rad_s(); }, axes);
+}
+
 // The nozzle that goes along with a base in even motion on all axes.
 [[nodiscard]] inline NozzleXY riding(const Axes<FlexibleAxis>& axes, const XY& position_mm,
                                      const XY& velocity_mm_s = {}) {

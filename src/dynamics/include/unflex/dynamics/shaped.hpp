@@ -1,5 +1,5 @@
 // What an input shaper makes of a motion m: Σ A_i m(t − t_i), with the pulses' weights A_i and
-// times t_i.
+// times t_i. Without pulses the motion stays as it is.
 #pragma once
 
 #include <cstddef>
@@ -28,10 +28,13 @@ inline void add(NozzleMotion& sum, const NozzleMotion& other, double times) {
 }
 inline void add(NozzleState& sum, const NozzleState& other, double times) { sum.add(other, times); }
 
-// The shaped motion at time t. at(i, t): the motion at time t, asked for the i-th pulse. sum: what
-// there is besides.
+// The shaped motion at time t. at(i, t): the motion at time t, asked for the i-th pulse; i is 0 if
+// there is none. sum: what there is besides.
 template <typename Motion, typename At>
 [[nodiscard]] Motion shaped_at(std::span<const Pulse> pulses, double t, At&& at, Motion sum = {}) {
+  if (pulses.empty()) {
+    add(sum, at(0, t), 1.0);
+  }
   for (std::size_t i = 0; i < pulses.size(); ++i) {
     add(sum, at(i, t - pulses[i].time_s), pulses[i].weight);
   }

@@ -25,6 +25,11 @@ inline constexpr std::array kXY{X, Y};
 inline constexpr std::array kXYZ{X, Y, Z};
 inline constexpr std::array kXYZE{X, Y, Z, E};
 
+// Whether X and Y are known, of what is known of all axes.
+[[nodiscard]] inline bool is_xy_known(const std::array<bool, 4>& known) {
+  return known[X] && known[Y];
+}
+
 // X, Y, Z and filament, mm.
 using Position = std::array<double, 4>;
 

@@ -37,7 +37,7 @@ struct LimitRow {
   double per_unit = 1.0;  // of the key's unit in one of the member's
 };
 
-// Rows of axes stand together.
+// Rows of axes stand together, so that differences can be told axis by axis.
 [[nodiscard]] std::span<const LimitRow> limit_rows();
 
 }  // namespace unflex::planner

@@ -105,7 +105,6 @@ class NozzleWalkXY {
  public:
   NozzleWalkXY(const Axes<dynamics::FlexibleAxis>& axes, const Axes<AxisPath>& paths,
                double start_s);
-  [[nodiscard]] dynamics::NozzleMotionXY motion(double t);
   [[nodiscard]] XY place_mm(double t);
 
  private:

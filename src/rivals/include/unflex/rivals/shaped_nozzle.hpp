@@ -51,7 +51,7 @@ class ShapedNozzle {
   };
   struct Taps {
     dynamics::ShaperPulses pulses;
-    std::vector<std::size_t> index;  // for each, the sample at or before the delayed time
+    std::vector<std::size_t> index;  // of the sample at or before the delayed time; one at least
   };
 
   [[nodiscard]] dynamics::NozzleMotion sum(std::size_t axis, double time_s);

@@ -1,9 +1,9 @@
-// How far the nozzle is from where it should be across the sliced path, while filament is laid:
+// How far the nozzle is across the sliced path from where it should be, while filament is laid.
 //
-//   path_error()      of the nozzle p* that hangs on the base as optimised, from the path
-//   emission_error()  of the nozzle p that the printer's replay of the lines makes, from p*: what
-//   it
-//                     costs that the base's motion is written as few lines, on the printer's grid
+//   path_error()           p* from the path; p* is the nozzle on the base as optimised
+//   add_emission_error()   p from p*; p is the nozzle on the lines as the printer replays them
+//
+// The second is what it costs to write the base's motion as few lines, on the printer's grid.
 #pragma once
 
 #include <cstddef>
@@ -27,13 +27,12 @@ struct PathError {
   [[nodiscard]] double rms_mm() const;
 };
 
-// A run's sliced moves, the base that was found for them, which begins lead_in_s before them, and
-// the nozzle when the base begins. All of it must stay where it is.
+// A run and the base that was found for it, which must outlive this.
 struct RunOnBase {
-  const std::vector<planner::PlannedMove>& plan;
-  double lead_in_s;
+  const std::vector<planner::PlannedMove>& plan;  // the sliced moves
+  double lead_in_s;                               // how long before them the base begins
   const dynamics::BaseTrajectory& base;
-  const dynamics::NozzleXY& start;
+  const dynamics::NozzleXY& start;  // the nozzle when the base begins
 };
 
 // Both are sampled at the nodes of the base's motion.
