@@ -10,12 +10,14 @@ mark_as_advanced(UNFLEX_NUMERICAL_OPTIMISATION UNFLEX_PLAIN_OPTIMISATION UNFLEX_
 # NUMERICAL: its loops are worth -O3. The others are compiled with -O2, which takes the compiler less
 # time.
 #
-# Declares the static library unflex_<name> (alias unflex::<name>) from the sources of
-# src/<name>. Headers for other modules are in src/<name>/include/unflex/<name>, and those for users of
-# the library in include/unflex/<name>.
+# Declares the static library unflex_<name> (alias unflex::<name>) from the sources of src/<name> and
+# from the files of src/firmware that each firmware lists for the module. Headers for other modules
+# are in src/<name>/include/unflex/<name>, and those for users of the library in
+# include/unflex/<name>.
 function(unflex_module name)
   cmake_parse_arguments(ARG "NUMERICAL" "" "SOURCES;LINKS;PRIVATE_LINKS" ${ARGN})
-  add_library(unflex_${name} STATIC ${ARG_SOURCES})
+  unflex_firmware_sources(firmware_sources ${name})
+  add_library(unflex_${name} STATIC ${ARG_SOURCES} ${firmware_sources})
   add_library(unflex::${name} ALIAS unflex_${name})
   target_include_directories(unflex_${name} PUBLIC
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>

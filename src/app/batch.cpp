@@ -84,18 +84,19 @@ class NewFolders {
 
 // Checks that the summary does not take the place of a file that is read or made.
 Status check_summary(const RunConfig& config, const BatchFiles& files) {
-  if (!config.summary) {
+  if (!config.batch.summary) {
     return {};
   }
-  std::vector<std::string> others = {platform::joined(config.output, manifest_name(config.shard)),
-                                     config.printer_file.value_or("")};
+  std::vector<std::string> others = {
+      platform::joined(config.output, manifest_name(config.batch.shard)),
+      config.printer_file.value_or("")};
   for (const BatchPrint& print : files.prints) {
     others.insert(others.end(), {print.input, print.output, print.report.value_or("")});
   }
   const bool taken = std::ranges::any_of(others, [&](const std::string& other) {
-    return platform::same_file(*config.summary, other);
+    return platform::same_file(*config.batch.summary, other);
   });
-  return taken ? Status(fail(ErrorKind::usage, {*config.summary, 0},
+  return taken ? Status(fail(ErrorKind::usage, {*config.batch.summary, 0},
                              "is read or written already; give the summary a name of its own"))
                : Status{};
 }
@@ -111,7 +112,7 @@ RunConfig config_of(const RunConfig& config, const BatchPrint& print, unsigned w
   if (print.printer_file) {
     one.printer_file = print.printer_file;
   }
-  one.workers = workers;
+  one.solve.workers = workers;
   one.quiet = true;
   return one;
 }
@@ -153,7 +154,7 @@ class Batch {
       : config_(&config), files_(std::move(files)), manifest_(&manifest), console_(&console) {
     summary_.input = config.input;
     summary_.output = config.output;
-    summary_.shard = config.shard;
+    summary_.shard = config.batch.shard;
     for (const Diagnostic& remark : files_.passed_by) {
       summary_.passed_by.push_back(to_string(remark));
       console.line(summary_.passed_by.back());
@@ -190,7 +191,7 @@ class Batch {
 
   // waiting: the next print is at the end.
   Status work_on(std::vector<std::size_t> waiting) {
-    BatchWorkers processes(config_->workers);
+    BatchWorkers processes(config_->solve.workers);
     while (!waiting.empty() || processes.any()) {
       while (const unsigned workers = processes.workers_for_next(waiting.size())) {
         if (Status started = start(processes, waiting.back(), workers); !started) {
@@ -269,12 +270,12 @@ class Batch {
 
 // Leaves the prints of the shard. What is wrong with the folder is told by the first shard alone.
 void keep_shard(const RunConfig& config, BatchFiles& files) {
-  if (!config.shard) {
+  if (!config.batch.shard) {
     return;
   }
   std::erase_if(files.prints,
-                [&](const BatchPrint& print) { return !has(*config.shard, print.name); });
-  if (config.shard->number != 1) {
+                [&](const BatchPrint& print) { return !has(*config.batch.shard, print.name); });
+  if (config.batch.shard->number != 1) {
     files.unreadable.clear();
     files.passed_by.clear();
   }
@@ -325,15 +326,15 @@ Status write_summary(const RunConfig& config, std::optional<Output>& file,
   if (!file) {
     return {};
   }
-  const bool xml = config.summary->ends_with(".xml");
+  const bool xml = config.batch.summary->ends_with(".xml");
   return write_report(file, xml ? summary_junit(summary) : summary_json(summary));
 }
 
 Result<std::optional<Output>> open_summary(const RunConfig& config) {
-  if (!config.summary) {
+  if (!config.batch.summary) {
     return std::optional<Output>();
   }
-  return Output::open(*config.summary).map([](Output output) {
+  return Output::open(*config.batch.summary).map([](Output output) {
     return std::optional<Output>(std::move(output));
   });
 }
@@ -347,14 +348,14 @@ Result<ExitCode> run_batch(const RunConfig& config, Console& console) {
   }
   const Status checked =
       check_printer_file(config)
-          .and_then([&] { return config.watch ? Status{} : check_has_print(config, *files); })
+          .and_then([&] { return config.batch.watch ? Status{} : check_has_print(config, *files); })
           .and_then([&] { return check_printers(config, *files); })
           .and_then([&] { return check_summary(config, *files); });
   if (!checked) {
     return tl::unexpected(checked.error());
   }
   NewFolders folders(config.output);
-  Result<BatchManifest> manifest = BatchManifest::open(config.output, config.shard);
+  Result<BatchManifest> manifest = BatchManifest::open(config.output, config.batch.shard);
   if (!manifest) {
     return tl::unexpected(manifest.error());
   }
@@ -364,7 +365,7 @@ Result<ExitCode> run_batch(const RunConfig& config, Console& console) {
     return tl::unexpected(summary_file.error());
   }
   folders.keep();
-  if (config.watch) {
+  if (config.batch.watch) {
     return watch(config, *manifest, console);
   }
   keep_shard(config, *files);

@@ -7,7 +7,7 @@
 
 namespace unflex::app {
 
-// Call it before any thread exists. The exit code is that of the worst print.
+// Call it before any thread exists. The exit code is the worst print's.
 [[nodiscard]] Result<ExitCode> run_batch(const RunConfig& config, Console& console);
 
 }  // namespace unflex::app

@@ -24,7 +24,8 @@ struct BatchPrint {
   std::string input;
   std::string output;
   std::optional<std::string> report;
-  // That of its own folder or the next one above that has one; unset: that of the command line.
+  // The printer file in its own folder, or in the next folder above that has one. Unset: the one of
+  // the command line.
   std::optional<std::string> printer_file;
   std::uint64_t bytes = 0;
 };

@@ -67,7 +67,7 @@ Result<std::string> hash_of_settings(const RunConfig& config) {
   if (!settings) {
     return tl::unexpected(settings.error());
   }
-  std::string text = fmt::format("engine={}\n", name_of(config.engine));
+  std::string text = fmt::format("engine={}\n", name_of(config.solve.engine));
   for (const machine::SettingRow& row : machine::rows(*settings)) {
     text += fmt::format("{}={}\n", row.key, row.value);
   }
@@ -137,13 +137,13 @@ Status make_folder_of(const std::string& file) {
 }
 
 BatchFigures figures_of(const report::Report& report) {
-  const report::DeviationRow& before = report.uncompensated.extruding;
-  const report::DeviationRow& after = report.compensated.extruding;
+  const verify::DeviationStats& before = report.measured.uncompensated.extruding;
+  const verify::DeviationStats& after = report.measured.compensated.extruding;
   return {.max_before_mm = before.contour_max_mm,
           .max_after_mm = after.contour_max_mm,
           .rms_before_mm = before.contour_rms_mm,
           .rms_after_mm = after.contour_rms_mm,
-          .print_time_s = report.emitted_time_s};
+          .print_time_s = report.measured.compensated.time_s};
 }
 
 // Compensates the print and fills the answer. Errors are those of compensating.

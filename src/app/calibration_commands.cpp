@@ -50,7 +50,7 @@ void add_tower(CLI::App& command, RunConfig& config) {
       ->check(positive());
 }
 
-// "x=12..19", or "x=14" for a single band; "pressure=12..19" likewise.
+// "x=12..19", or "x=14" for a single band. "pressure=" takes the same two forms.
 std::string read_zone(const std::string& text, TuneConfig& tune) {
   const std::size_t equals = std::min(text.find('='), text.size());
   const std::string of = text.substr(0, equals);

@@ -46,11 +46,11 @@ Status check_report(const RunConfig& config) {
     const bool taken = config.command == Command::compensate && config.output == kStandardStream;
     return taken ? Status(usage("the output and the report cannot both go to stdout")) : Status{};
   }
-  const bool json_alone = config.command == Command::inspect || !config.accels_mm_s2.empty();
+  const bool json_alone = config.command == Command::inspect || !config.study.accels_mm_s2.empty();
   if (json_alone && !name.ends_with(".json")) {
     return usage(fmt::format("--report {}: the name must end in .json", name));
   }
-  if (!config.tolerances_um.empty() && name.ends_with(".svg")) {
+  if (!config.study.tolerances_um.empty() && name.ends_with(".svg")) {
     return check_has_name("--report", name, {".svg"});
   }
   if (!name.ends_with(".json") && !is_html(name)) {
@@ -64,27 +64,28 @@ Status check_report(const RunConfig& config) {
 
 Status check_study(const RunConfig& config) {
   const bool has_print = !config.input.empty();
-  if (has_print && !config.cases.empty()) {
+  if (has_print && !config.study.cases.empty()) {
     return usage("--case is of the corner; a print has none");
   }
-  if (!has_print && !config.machines.empty()) {
+  if (!has_print && !config.study.machines.empty()) {
     return usage("--machines needs a print to judge them by");
   }
-  if (!has_print && !config.tolerances_um.empty()) {
+  if (!has_print && !config.study.tolerances_um.empty()) {
     return usage("--faster needs a print whose time it is");
   }
-  if (!has_print && !config.accels_mm_s2.empty()) {
+  if (!has_print && !config.study.accels_mm_s2.empty()) {
     return usage("--accel needs a print to compensate");
   }
-  const int studies = (config.machines.empty() ? 0 : 1) + (config.tolerances_um.empty() ? 0 : 1) +
-                      (config.accels_mm_s2.empty() ? 0 : 1);
+  const int studies = (config.study.machines.empty() ? 0 : 1) +
+                      (config.study.tolerances_um.empty() ? 0 : 1) +
+                      (config.study.accels_mm_s2.empty() ? 0 : 1);
   if (studies > 1) {
     return usage("give one of --machines, --faster and --accel");
   }
-  if (config.accels_mm_s2.empty() && (config.scale_m204 || config.keep_rms_um)) {
+  if (config.study.accels_mm_s2.empty() && (config.study.scale_m204 || config.study.keep_rms_um)) {
     return usage("--scale-m204 and --keep-rms go with --accel");
   }
-  if (config.at_all_times && config.tolerances_um.empty()) {
+  if (config.study.at_all_times && config.study.tolerances_um.empty()) {
     return usage("--at-all-times says how strictly --faster is meant; give that too");
   }
   if (!has_print && (config.printer_file || !config.overrides.empty())) {
@@ -208,14 +209,14 @@ Status check_hotend(const RunConfig& config) {
 }
 
 Status check_batch(RunConfig& config) {
-  if (!config.shard_text.empty()) {
-    const Result<Shard> shard = shard_of(config.shard_text, environment_variable);
+  if (!config.batch.shard_text.empty()) {
+    const Result<Shard> shard = shard_of(config.batch.shard_text, environment_variable);
     if (!shard) {
       return tl::unexpected(shard.error());
     }
-    config.shard = *shard;
+    config.batch.shard = *shard;
   }
-  if (config.watch && config.summary) {
+  if (config.batch.watch && config.batch.summary) {
     return usage("--watch does not come to an end, so there is no --summary");
   }
   for (const std::string& folder : {config.input, config.output, config.report.value_or(".")}) {
@@ -226,21 +227,24 @@ Status check_batch(RunConfig& config) {
       return usage("the name of a folder is empty");
     }
   }
-  if (config.summary && !config.summary->ends_with(".json") && !config.summary->ends_with(".xml")) {
-    return usage(fmt::format("--summary {}: the name must end in .json or .xml", *config.summary));
+  if (config.batch.summary && !config.batch.summary->ends_with(".json") &&
+      !config.batch.summary->ends_with(".xml")) {
+    return usage(
+        fmt::format("--summary {}: the name must end in .json or .xml", *config.batch.summary));
   }
-  return config.summary ? check_has_name("--summary", *config.summary, {".json", ".xml"})
-                        : Status{};
+  return config.batch.summary
+             ? check_has_name("--summary", *config.batch.summary, {".json", ".xml"})
+             : Status{};
 }
 
 }  // namespace
 
 Status complete(RunConfig& config) {
-  if (config.check_solver && config.engine == flow::EngineChoice::ipopt) {
+  if (config.solve.check && config.solve.engine == flow::EngineChoice::ipopt) {
     return usage("--check-solver: it is Ipopt that checks; leave out --engine ipopt");
   }
   if (Status built =
-          flow::check_built(config.check_solver ? flow::EngineChoice::ipopt : config.engine);
+          flow::check_built(config.solve.check ? flow::EngineChoice::ipopt : config.solve.engine);
       !built) {
     return built;
   }

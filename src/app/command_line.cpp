@@ -103,14 +103,14 @@ void take_tolerances(RunConfig& config) {
           "--faster",
           fmt::format("'{}' is not a number above 0, and up to {:g}", word, kMostTolerance_um));
     }
-    config.tolerances_um.push_back(*value);
+    config.study.tolerances_um.push_back(*value);
     more = comma != std::string_view::npos;
     rest.remove_prefix(more ? comma + 1 : rest.size());
   }
 }
 
 void add_engine(CLI::App& command, RunConfig& config, const char* help) {
-  command.add_option("--engine", config.engine, help)
+  command.add_option("--engine", config.solve.engine, help)
       ->type_name("auto|banded|ipopt")
       ->transform(word_for<flow::EngineChoice>({{"auto", flow::EngineChoice::automatic},
                                                 {"banded", flow::EngineChoice::banded},
@@ -118,7 +118,7 @@ void add_engine(CLI::App& command, RunConfig& config, const char* help) {
 }
 
 void add_check_solver(CLI::App& command, RunConfig& config) {
-  command.add_flag("--check-solver", config.check_solver,
+  command.add_flag("--check-solver", config.solve.check,
                    "Have a sample solved by Ipopt as well, and warn if it finds something else");
 }
 
@@ -161,14 +161,14 @@ void add_batch(CLI::App& program, RunConfig& config) {
   command->add_option("--report", config.report, "A page for each print, in this folder")
       ->type_name("DIR");
   command
-      ->add_option("--summary", config.summary,
+      ->add_option("--summary", config.batch.summary,
                    "Write what became of each print, FILE.json, or FILE.xml for JUnit")
       ->type_name("FILE");
   command
-      ->add_option("--shard", config.shard_text,
+      ->add_option("--shard", config.batch.shard_text,
                    "Work on the I-th of N parts, I/N; auto: as Slurm or Kubernetes says")
       ->type_name("I/N");
-  command->add_flag("--watch", config.watch, "Go on waiting for further prints");
+  command->add_flag("--watch", config.batch.watch, "Go on waiting for further prints");
   command->add_flag("-q,--quiet", config.quiet, "No table and no progress");
   add_faster(*command, config);
   add_timing(*command, config);
@@ -232,25 +232,25 @@ void add_study(CLI::App& program, RunConfig& config) {
       "study", "Measure all ways to move the base against each other, on a corner or on a print");
   command->add_option("IN", config.input, "G-code, - for stdin; without it the thesis' corner")
       ->type_name("");
-  command->add_option("--case", config.cases, "Only this case of the corner; repeatable")
+  command->add_option("--case", config.study.cases, "Only this case of the corner; repeatable")
       ->type_name("NAME")
       ->allow_extra_args(false);
   command
-      ->add_option("--machines", config.machines,
+      ->add_option("--machines", config.study.machines,
                    "With IN: judge unflex and shapers on the machines whose records are in DIR")
       ->type_name("DIR");
   command
       ->add_flag("--faster", config.faster_um,
                  "With IN: the least print time within contour errors, 5,10,20,50,100 by default")
       ->type_name("[=UM]");
-  command->add_flag("--at-all-times", config.at_all_times,
+  command->add_flag("--at-all-times", config.study.at_all_times,
                     "With --faster: let no moment exceed it, not even a thousandth");
   command
       ->add_option_function<std::vector<std::string>>(
           "--accel",
           [&config](const std::vector<std::string>& texts) {
             for (const std::string& text : texts) {
-              config.accels_mm_s2.push_back(number_of("--accel", text));
+              config.study.accels_mm_s2.push_back(number_of("--accel", text));
             }
           },
           "With IN: compensate it at these accelerations, as 2500,5000,10000")
@@ -258,9 +258,9 @@ void add_study(CLI::App& program, RunConfig& config) {
       ->delimiter(',')
       ->allow_extra_args(false)
       ->check(positive());
-  command->add_flag("--scale-m204", config.scale_m204,
+  command->add_flag("--scale-m204", config.study.scale_m204,
                     "With --accel: scale what the print itself sets of acceleration as well");
-  add_number(*command, "--keep-rms", config.keep_rms_um,
+  add_number(*command, "--keep-rms", config.study.keep_rms_um,
              "With --accel: name the fastest whose RMS error is at most this")
       ->type_name("UM")
       ->check(positive());
@@ -389,7 +389,7 @@ Result<CommandLine> answer_to(const std::exception& thrown, const CLI::App& prog
                           : tl::unexpected(error_of(thrown));
 }
 
-// What the library would take for a value that is missing, or for the input's name.
+// Arguments that the library would take for a missing value or for the input's name.
 Status check_values(const std::vector<std::string>& arguments) {
   for (auto word = arguments.begin(); word != arguments.end(); ++word) {
     if (word->starts_with("--") && word->ends_with('=') && word->find('=') + 1 == word->size()) {
@@ -438,7 +438,7 @@ std::string_view version() { return UNFLEX_VERSION; }
 
 Result<CommandLine> parse_command_line(const std::vector<std::string>& arguments) {
   RunConfig config;
-  config.workers = std::clamp(processors(), 1U, kMaxWorkers);
+  config.solve.workers = std::clamp(processors(), 1U, kMaxWorkers);
   CLI::App program("Takes the flex out of a 3D printer: pre-compensated G-code from sliced G-code",
                    "unflex");
   program.set_version_flag("--version", fmt::format("unflex {}", version()));

@@ -80,7 +80,7 @@ void add_common_options(CLI::App& command, RunConfig& config, const char* report
 
 void add_jobs(CLI::App& command, RunConfig& config) {
   command
-      .add_option("-j,--jobs", config.workers,
+      .add_option("-j,--jobs", config.solve.workers,
                   "How many to compute at once, 1 to 256, all processors by default")
       ->type_name("N")
       ->check(counting_number(kMaxWorkers));

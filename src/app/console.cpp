@@ -13,7 +13,7 @@
 namespace unflex::app {
 namespace {
 
-// At most so many lines of a kind are shown, and so many kinds.
+// The most lines of a kind that are shown, and the most kinds.
 constexpr std::size_t kMaxAlike = 3;
 constexpr std::size_t kMaxKinds = 10;
 

@@ -19,18 +19,18 @@ using report::Json;
 using Sink = std::back_insert_iterator<std::string>;
 
 Json lines_json(const Inspection& i) {
-  return {{"total", i.lines},
-          {"bytes", i.bytes},
-          {"passive", i.passive_lines},
-          {"limits", i.limit_lines},
-          {"barriers", i.barrier_lines}};
+  return {{"total", i.counts.lines},
+          {"bytes", i.counts.bytes},
+          {"passive", i.counts.passive_lines},
+          {"limits", i.counts.limit_lines},
+          {"barriers", i.counts.barrier_lines}};
 }
 
 Json moves_json(const Inspection& i) {
-  return {{"total", i.moves},
-          {"extruding", i.extruding_moves},
-          {"extrude_only", i.extrude_only_moves},
-          {"arcs", i.arcs},
+  return {{"total", i.counts.moves},
+          {"extruding", i.counts.extruding_moves},
+          {"extrude_only", i.counts.extrude_only_moves},
+          {"arcs", i.counts.arcs},
           {"path_length_mm", i.path_length_mm},
           {"lowest_accel_mm_s2", i.lowest_accel_mm_s2},
           {"highest_accel_mm_s2", i.highest_accel_mm_s2},
@@ -43,10 +43,11 @@ constexpr int kValueColumns = 14;
 
 void write_counts(Sink out, const Inspection& i) {
   fmt::format_to(out, "dialect       {}\n", i.dialect.empty() ? "unknown" : i.dialect);
-  fmt::format_to(out, "lines         {} ({:.1f} MB), {} of them stop the machine\n", i.lines,
-                 static_cast<double>(i.bytes) * 1e-6, i.barrier_lines);
-  fmt::format_to(out, "moves         {}, {} extruding, {} of filament alone, {} arcs\n", i.moves,
-                 i.extruding_moves, i.extrude_only_moves, i.arcs);
+  fmt::format_to(out, "lines         {} ({:.1f} MB), {} of them stop the machine\n", i.counts.lines,
+                 static_cast<double>(i.counts.bytes) * 1e-6, i.counts.barrier_lines);
+  fmt::format_to(out, "moves         {}, {} extruding, {} of filament alone, {} arcs\n",
+                 i.counts.moves, i.counts.extruding_moves, i.counts.extrude_only_moves,
+                 i.counts.arcs);
   fmt::format_to(out, "extent        X {:.3f} to {:.3f}, Y {:.3f} to {:.3f}, Z to {:.3f} mm\n",
                  i.min_mm.x, i.max_mm.x, i.min_mm.y, i.max_mm.y, i.z_max_mm);
   fmt::format_to(out, "path          {:.0f} mm, filament {:.2f} mm ({} extrusion)\n",

@@ -156,7 +156,7 @@ KnownAxes known_axes(const MachineRecords& records, const identify::Sweep& sweep
 }  // namespace
 
 Result<ExitCode> run_machines(const RunConfig& config, Console& console) {
-  const Result<std::vector<MachineRecords>> machines = read_machines(config.machines);
+  const Result<std::vector<MachineRecords>> machines = read_machines(config.study.machines);
   if (!machines) {
     return tl::unexpected(machines.error());
   }
@@ -171,7 +171,7 @@ Result<ExitCode> run_machines(const RunConfig& config, Console& console) {
   }
   if (all.empty()) {
     console.warnings(warnings);
-    return fail(ErrorKind::input, {config.machines, 0},
+    return fail(ErrorKind::input, {config.study.machines, 0},
                 "holds no machine whose records carry a model of both axes");
   }
   Result<Workspace> space = open_workspace(with_axes(config, all.front()));

@@ -30,7 +30,7 @@ ExitCode exit_code_of(const RunConfig& config, bool passed_on, const report::Rep
   if (report.violation_count > 0) {
     return ExitCode::deviation;
   }
-  const double deviation_mm = report.compensated.extruding.contour_max_mm;
+  const double deviation_mm = report.measured.compensated.extruding.contour_max_mm;
   if (config.max_deviation_mm && !(deviation_mm <= *config.max_deviation_mm)) {
     console.line(
         fmt::format("{}: extruding moves stray up to {:.6g} mm, more than --max-deviation {}{}",

@@ -75,9 +75,9 @@ Result<ExitCode> run_inspect(const RunConfig& config, Console& console) {
 Result<study::Outcome> study_outcome(const RunConfig& config, std::optional<Workspace>& print) {
   const bool traces = config.report && config.report->ends_with(".html");
   if (!print) {
-    const study::Options options{.ipopt = config.engine == flow::EngineChoice::ipopt,
-                                 .workers = config.workers,
-                                 .cases = config.cases,
+    const study::Options options{.ipopt = config.solve.engine == flow::EngineChoice::ipopt,
+                                 .workers = config.solve.workers,
+                                 .cases = config.study.cases,
                                  .traces = traces};
     return with_progress(
         config, [&](Progress& progress) { return study::study_corner(options, progress); });
@@ -164,11 +164,11 @@ Result<ExitCode> run_print_study(const RunConfig& config, Console& console,
 // study --faster
 Result<ExitCode> run_fastest(const RunConfig& config, Console& console) {
   std::vector<double> tolerances_mm;
-  for (const double tolerance_um : config.tolerances_um) {
+  for (const double tolerance_um : config.study.tolerances_um) {
     tolerances_mm.push_back(1e-3 * tolerance_um);
   }
   study::ToleranceRule rule;
-  rule.largest_times = config.at_all_times ? 1.0 : rule.largest_times;
+  rule.largest_times = config.study.at_all_times ? 1.0 : rule.largest_times;
   return run_print_study(
       config, console, study::settings_of_fastest,
       [&](const flow::Job& job, Progress& progress) {
@@ -187,9 +187,10 @@ Result<ExitCode> run_accels(const RunConfig& config, Console& console) {
   return run_print_study(
       config, console, [](machine::Settings settings) { return settings; },
       [&](const flow::Job& job, Progress& progress) {
-        auto outcome = study::study_accels(job, config.accels_mm_s2, config.scale_m204, progress);
-        if (outcome && config.keep_rms_um) {
-          outcome->keep_rms_mm = 1e-3 * *config.keep_rms_um;
+        auto outcome =
+            study::study_accels(job, config.study.accels_mm_s2, config.study.scale_m204, progress);
+        if (outcome && config.study.keep_rms_um) {
+          outcome->keep_rms_mm = 1e-3 * *config.study.keep_rms_um;
         }
         return outcome;
       },
@@ -211,13 +212,14 @@ Result<ExitCode> run_command(const RunConfig& config, Console& console) {
     case Command::identify:
       return run_identify(config, console);
     case Command::study:
-      if (!config.tolerances_um.empty()) {
+      if (!config.study.tolerances_um.empty()) {
         return run_fastest(config, console);
       }
-      if (!config.accels_mm_s2.empty()) {
+      if (!config.study.accels_mm_s2.empty()) {
         return run_accels(config, console);
       }
-      return config.machines.empty() ? run_study(config, console) : run_machines(config, console);
+      return config.study.machines.empty() ? run_study(config, console)
+                                           : run_machines(config, console);
     case Command::batch:
       return run_batch(config, console);
     case Command::tune:

@@ -20,7 +20,8 @@ using Known = std::array<tune::Knowledge, 2>;
 
 constexpr std::array kLetters = {'x', 'y'};
 
-// A frequency that is given by hand, or taken from the printer's own shaper, may be so much off.
+// Relative error that a frequency may have which is given by hand or taken from the printer's own
+// shaper.
 constexpr double kErrorOfGiven = 0.15;
 constexpr double kDampingErrorOfGiven = 0.05;
 

@@ -228,7 +228,7 @@ Status write_tower(const RunConfig& config, const TowerSite& site, const tune::T
     page.emplace(std::move(*opened));
   }
   const Result<std::vector<tune::Band>> bands = with_progress(config, [&](Progress& progress) {
-    return tune::compensate_bands(tower, of_bands, config.workers, progress);
+    return tune::compensate_bands(tower, of_bands, config.solve.workers, progress);
   });
   if (!bands) {
     return tl::unexpected(bands.error());

@@ -14,7 +14,7 @@
 namespace unflex::app {
 namespace {
 
-// An advance that is given may be so much off.
+// Relative error that a given advance may have.
 constexpr double kErrorOfGiven = 0.3;
 // Rings are slow, and there are many bands.
 constexpr std::size_t kLayersPerBand = 5;

@@ -182,9 +182,9 @@ Result<flow::Job> job_of(const RunConfig& config, Workspace& space) {
     job.output = space.compensated->text();
   }
   job.settings = space.settings;
-  job.engine = config.engine;
-  job.check_solver = config.check_solver;
-  job.workers = config.workers;
+  job.engine = config.solve.engine;
+  job.check_solver = config.solve.check;
+  job.workers = config.solve.workers;
   job.all_shapers = config.report.has_value();
   return job;
 }

@@ -434,19 +434,4 @@ PointVector node(const OptimalControlProblem& problem, std::span<const double> x
   return Eigen::Map<const Eigen::VectorXd>(x.data() + static_cast<std::ptrdiff_t>(k) * nz, nz);
 }
 
-StateVector interpolate(const OptimalControlProblem& problem, double t1, const PointVector& z1,
-                        double t2, const PointVector& z2, double s) {
-  const int nx = problem.states();
-  const double h = t2 - t1;
-  StateVector f1(nx);
-  StateVector f2(nx);
-  problem.dynamics(t1, z1, f1);
-  problem.dynamics(t2, z2, f2);
-  // Cubic Hermite basis.
-  const double s2 = s * s;
-  const double s3 = s2 * s;
-  return (2.0 * s3 - 3.0 * s2 + 1.0) * z1.head(nx) + (s3 - 2.0 * s2 + s) * h * f1 +
-         (3.0 * s2 - 2.0 * s3) * z2.head(nx) + (s3 - s2) * h * f2;
-}
-
 }  // namespace unflex::collocation

@@ -2,33 +2,44 @@
 
 namespace unflex::compensate {
 
+BandedLdlt::Diagonals::Diagonals(const BandMatrix& h, std::size_t first, std::size_t last) {
+  for (std::size_t d = 0; d <= kHalfBand; ++d) {
+    from_first[d] = h[d].data() + first;
+    from_last[d] = h[d].data() + last - d;
+  }
+}
+
+inline void BandedLdlt::Diagonals::load(std::size_t r, std::size_t j, Window& w) const {
+  for (std::size_t i = 0; i <= j; ++i) {
+    const std::size_t d = j - i;
+    w[i][j] = Pair(from_first[d][r + i], *(from_last[d] - r - i));
+  }
+}
+
 bool BandedLdlt::factor(const BandMatrix& h, std::size_t first, std::size_t last) {
   first_ = first;
   size_ = last - first + 1;
   const std::size_t steps = (size_ - kHalfBand) / 2;
   middle_size_ = size_ - 2 * steps;
   columns_.resize(steps);
-  std::array<const double*, kHalfBand + 1> from_first;
-  std::array<const double*, kHalfBand + 1> from_last;
-  for (std::size_t d = 0; d <= kHalfBand; ++d) {
-    from_first[d] = h[d].data() + first;
-    from_last[d] = h[d].data() + last - d;
+  const Diagonals diagonals(h, first, last);
+  Window left;
+  if (!(eliminate(diagonals, left).minCoeff() > 0.0)) {
+    return false;
   }
-  // Rows and columns r … r + 5 after r steps, upper triangle. load() takes column j from the
-  // matrix.
-  Pair w[kHalfBand + 1][kHalfBand + 1];
-  const auto load = [&](std::size_t r, std::size_t j) {
-    for (std::size_t i = 0; i <= j; ++i) {
-      const std::size_t d = j - i;
-      w[i][j] = Pair(from_first[d][r + i], *(from_last[d] - r - i));
-    }
-  };
+  set_middle(diagonals, left);
+  return factor_middle();
+}
+
+BandedLdlt::Pair BandedLdlt::eliminate(const Diagonals& h, Window& left) {
+  // A variable of its own cannot overlap columns_, so it may stay in registers.
+  Window w;
   for (std::size_t j = 0; j < kHalfBand; ++j) {
-    load(0, j);
+    h.load(0, j, w);
   }
   Pair smallest = w[0][0];
-  for (std::size_t r = 0; r < steps; ++r) {
-    load(r, kHalfBand);
+  for (std::size_t r = 0; r < columns_.size(); ++r) {
+    h.load(r, kHalfBand, w);
     Column& column = columns_[r];
     smallest = smallest.min(w[0][0]);
     const Pair inverse = 1.0 / w[0][0];
@@ -47,26 +58,30 @@ bool BandedLdlt::factor(const BandMatrix& h, std::size_t first, std::size_t last
     }
     w[0][0] = next;
   }
-  if (!(smallest.minCoeff() > 0.0)) {
-    return false;
+  for (std::size_t i = 0; i < kHalfBand; ++i) {
+    for (std::size_t j = i; j < kHalfBand; ++j) {
+      left[i][j] = w[i][j];
+    }
   }
-  // The middle block: the matrix itself and the updates of both sides.
+  return smallest;
+}
+
+void BandedLdlt::set_middle(const Diagonals& h, const Window& left) {
+  const std::size_t steps = columns_.size();
   middle_.setZero();
-  const double* const* diagonal = from_first.data();
   for (std::size_t i = 0; i < middle_size_; ++i) {
     for (std::size_t j = i; j < middle_size_ && j - i <= kHalfBand; ++j) {
-      middle_(j, i) = diagonal[j - i][steps + i];
+      middle_(j, i) = h.from_first[j - i][steps + i];
     }
   }
   const std::size_t end = middle_size_ - 1;
   for (std::size_t i = 0; i < kHalfBand; ++i) {
     for (std::size_t j = i; j < kHalfBand; ++j) {
       const std::size_t d = j - i;
-      middle_(j, i) += w[i][j](0) - from_first[d][steps + i];
-      middle_(end - i, end - j) += w[i][j](1) - *(from_last[d] - steps - i);
+      middle_(j, i) += left[i][j](0) - h.from_first[d][steps + i];
+      middle_(end - i, end - j) += left[i][j](1) - *(h.from_last[d] - steps - i);
     }
   }
-  return factor_middle();
 }
 
 bool BandedLdlt::factor_middle() {

@@ -38,6 +38,25 @@ class BandedLdlt {
     std::array<Pair, kHalfBand> below;  // L at the next five rows
   };
 
+  // The part of the matrix that a step changes: rows and columns r … r + 5 after r steps, upper
+  // triangle.
+  using Window = std::array<std::array<Pair, kHalfBand + 1>, kHalfBand + 1>;
+
+  // The diagonals of the matrix, as seen from the first row and from the last one.
+  struct Diagonals {
+    Diagonals(const BandMatrix& h, std::size_t first, std::size_t last);
+    // Takes column j of the window after r steps from the matrix.
+    void load(std::size_t r, std::size_t j, Window& w) const;
+
+    std::array<const double*, kHalfBand + 1> from_first;
+    std::array<const double*, kHalfBand + 1> from_last;
+  };
+
+  // Eliminates the rows at both ends, up to the middle block. Sets `left` to what is left of the
+  // matrix behind them, and returns the smallest pivots.
+  Pair eliminate(const Diagonals& h, Window& left);
+  // Sets the middle block to the matrix itself and the updates of both sides.
+  void set_middle(const Diagonals& h, const Window& left);
   // Factorises the middle block, whose lower triangle is given. Returns false if a pivot is not
   // positive.
   [[nodiscard]] bool factor_middle();

@@ -8,11 +8,12 @@
 #include "lane_kernels.hpp"
 
 UNFLEX_FOUR_LANES_BEGIN
-// After all that they need.
+// These include nothing themselves, so they come last.
 #include "contour_lanes.hpp"
 #include "stage_lanes.hpp"
-// And after that.
+// These define members of stage_lanes.hpp.
 #include "stage_factor_lanes.hpp"
+#include "stage_sweep_lanes.hpp"
 
 namespace unflex::compensate {
 

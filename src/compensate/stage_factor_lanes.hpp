@@ -1,5 +1,5 @@
-// The factorisation of LaneStages (stage_lanes.hpp, which comes before it, and has the notation):
-// from the last stage to the first, the cost to go and the feedback.
+// The factorisation of LaneStages: the cost to go and the feedback, from the last stage to the
+// first. stage_lanes.hpp comes before this and has the notation.
 
 namespace unflex::compensate {
 
@@ -285,7 +285,7 @@ void LaneStages<Lanes, V, W>::carry_block_back(std::size_t a, std::size_t v, con
   }
 }
 
-// P_bs likewise.
+// Carries P_bs back over an interval.
 template <class Lanes, std::size_t V, std::size_t W>
 void LaneStages<Lanes, V, W>::carry_cross_back(const LaneRow<Lanes, 2 * V>& u,
                                                const LaneRow<Lanes, 2 * V>& c, const double* fb,

@@ -131,7 +131,7 @@ double atan2(double y, double x) {
   double a = std::abs(x);
   double b = std::abs(y);
   if (std::isinf(a) || std::isinf(b)) {
-    // As with ones in the place of the infinite, and zeros in that of the others.
+    // Ones take the place of infinite values, and zeros the place of the others.
     a = std::isinf(a) ? 1.0 : 0.0;
     b = std::isinf(b) ? 1.0 : 0.0;
   }

@@ -3,7 +3,7 @@
 namespace unflex::dynamics {
 namespace {
 
-// The free motion of y: that of the nozzle while the base rests in 0.
+// The free motion of y, while the base rests in 0.
 NozzleMotion free_motion(const Mode& mode, double place, double rate, double h) {
   const Mode alone{mode.omega_rad_s, mode.zeta};
   return exact_step(FlexibleAxis(std::span(&alone, 1)), {{NozzleMotion{place, rate}}}, {}, h)

@@ -25,7 +25,7 @@ void set_axis_limits(const RunLimits& run, planner::Limits& limits);
 [[nodiscard]] planner::Limits limits_in_run(Firmware firmware, const planner::Limits& file,
                                             planner::Limits raised);
 
-// What Z may do inside a run with the limits in_run: how far its speed may jump, and how fast it
+// Limits of Z inside a run with the limits in_run: how far its speed may jump, and how fast it
 // may accelerate.
 struct ZLimits {
   double speed_mm_s;

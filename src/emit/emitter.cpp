@@ -253,8 +253,8 @@ void Emitter::finish(std::string& out) {
 }
 
 std::string Emitter::shaper_left_off() const {
-  return unknown_shaper_lines(options_.fixed.firmware, input_.state().input_shaper(),
-                              printer_.state().input_shaper());
+  return unknown_shaper_lines(options_.fixed.firmware, input_.state().shaper,
+                              printer_.state().shaper);
 }
 
 // Before the first line that is not the sliced file's.

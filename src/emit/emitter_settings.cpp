@@ -37,7 +37,7 @@ void Emitter::set_limits(const planner::Limits& limits, std::string& out, bool m
 }
 
 void Emitter::restore_shaper(std::string& out) {
-  set_shaper(input_.state().input_shaper(), printer_.state().input_shaper(), out);
+  set_shaper(input_.state().shaper, printer_.state().shaper, out);
   tell_shaper(out);
 }
 
@@ -79,8 +79,8 @@ void Emitter::restore_advance(bool with_smooth_time, std::string& out) {
 // Off, whoever may have switched it on: the printer's configuration, the file, or a macro.
 void Emitter::switch_shaper_off(std::string& out) {
   const gcode::ModalState& state = printer_.state();
-  gcode::Shaper current = state.input_shaper();
-  if (gcode::may_come_on(options_.fixed.firmware, input_.state().input_shaper())) {
+  gcode::Shaper current = state.shaper;
+  if (gcode::may_come_on(options_.fixed.firmware, input_.state().shaper)) {
     current.unknown = map_axes(std::logical_or{}, current.unknown, state.shaper_touched);
   }
   set_shaper({}, current, out);
@@ -112,8 +112,7 @@ std::string Emitter::words_of_shaper() const {
   constexpr std::string_view kCommand = "SET_INPUT_SHAPER";
   std::string words;
   for (const std::string& back :
-       shaper_lines(options_.fixed.firmware, input_.state().input_shaper(),
-                    printer_.state().input_shaper())) {
+       shaper_lines(options_.fixed.firmware, input_.state().shaper, printer_.state().shaper)) {
     words += back.substr(kCommand.size());
   }
   return words;

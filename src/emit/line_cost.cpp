@@ -208,66 +208,84 @@ typename LineCosts<kModes>::Shape LineCosts<kModes>::shape(std::size_t m) const 
 }
 
 template <int kModes>
-LineCost<kModes> LineCosts<kModes>::line(std::size_t k, std::size_t m) const {
-  const double duration = static_cast<double>(m) * dt_s();
-  const Shape& shape = shapes_[m];
-  LineCost<kModes> result;
-  // The motion that the chord from b_k to b_{k+m} alone would make.
-  std::array<ModesVector<kModes>, 2> begin;
-  std::array<double, 2> speed{};
+typename LineCosts<kModes>::Chord LineCosts<kModes>::chord(std::size_t k, std::size_t m) const {
+  Chord chord;
+  chord.duration_s = static_cast<double>(m) * dt_s();
   for (std::size_t axis = 0; axis < 2; ++axis) {
     const auto a = static_cast<Eigen::Index>(axis);
-    begin[axis] = nozzle(axis, k) - riding(axis, base_mm(k)[a]);
-    speed[axis] = (base_mm(k + m)[a] - base_mm(k)[a]) / duration;
+    chord.begin[axis] = nozzle(axis, k) - riding(axis, base_mm(k)[a]);
+    chord.speed_mm_s[axis] = (base_mm(k + m)[a] - base_mm(k)[a]) / chord.duration_s;
   }
+  return chord;
+}
+
+template <int kModes>
+inline typename LineCosts<kModes>::Off LineCosts<kModes>::off_at(const Look& look,
+                                                                 const Chord& chord,
+                                                                 std::size_t k) const {
+  const std::size_t j = look.j;
+  Off off;
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    const auto a = static_cast<Eigen::Index>(axis);
+    const NozzleAnswers<kModes>& answer = answers(axis);
+    auto [i, end] = entries(look.nozzle);
+    double swing = answer.free[j](0, i) * chord.begin[axis][i];
+    for (++i; i < end; ++i) {
+      swing += answer.free[j](0, i) * chord.begin[axis][i];
+    }
+    off.nozzle_mm[axis] = swing + place(look.nozzle, answer.ramp[j]) * chord.speed_mm_s[axis] -
+                          (place(look.nozzle, nozzle(axis, k + j)) - base_mm(k)[a]);
+    off.base_mm[axis] =
+        chord.speed_mm_s[axis] * look.s * chord.duration_s - (base_mm(k + j)[a] - base_mm(k)[a]);
+  }
+  return off;
+}
+
+template <int kModes>
+inline void LineCosts<kModes>::add_off(const Look& look, const Off& off, const ErrorWeight& w,
+                                       double share_s, RowSums& sums) {
+  const double base_weight = kBaseWeight * share_s;
+  const double to_x = share_s * (w.xx * off.nozzle_mm[0] + w.xy * off.nozzle_mm[1]);
+  const double to_y = share_s * (w.xy * off.nozzle_mm[0] + w.yy * off.nozzle_mm[1]);
+  sums.slope_x += to_x * look.x;
+  sums.slope_y += to_y * look.y;
+  Row base = Row::Zero();
+  base[2 * kModes] = 1.0 - look.s;
+  base[2 * kModes + 1] = look.s;
+  sums.slope_x += base_weight * off.base_mm[0] * base;
+  sums.slope_y += base_weight * off.base_mm[1] * base;
+  sums.constant +=
+      0.5 * (to_x * off.nozzle_mm[0] + to_y * off.nozzle_mm[1]) +
+      0.5 * base_weight * (off.base_mm[0] * off.base_mm[0] + off.base_mm[1] * off.base_mm[1]);
+}
+
+template <int kModes>
+void LineCosts<kModes>::add_looks(std::size_t k, std::size_t m, const Chord& chord,
+                                  RowSums& sums) const {
+  const Shape& shape = shapes_[m];
   const bool same_weight = same_weight_until_[k + 1] >= k + m;
   const ErrorWeight& only = weight(k + 1);
-  RowSquare xx = shape.base;
-  RowSquare xy = RowSquare::Zero();
-  RowSquare yy = shape.base;
+  sums.xx = shape.base;
+  sums.yy = shape.base;
   if (same_weight) {
-    xx += only.xx * shape.xx;
-    xy = only.xy * shape.xy;
-    yy += only.yy * shape.yy;
+    sums.xx += only.xx * shape.xx;
+    sums.xy = only.xy * shape.xy;
+    sums.yy += only.yy * shape.yy;
   }
-  Row slope_x = Row::Zero();
-  Row slope_y = Row::Zero();
   const double share_s = shape.between_s / static_cast<double>(nozzles());
-  const double base_weight = kBaseWeight * share_s;
   for (const Look& look : shape.looks) {
-    const std::size_t j = look.j;
-    std::array<double, 2> off{};
-    std::array<double, 2> off_base{};
-    for (std::size_t axis = 0; axis < 2; ++axis) {
-      const auto a = static_cast<Eigen::Index>(axis);
-      const NozzleAnswers<kModes>& answer = answers(axis);
-      auto [i, end] = entries(look.nozzle);
-      double swing = answer.free[j](0, i) * begin[axis][i];
-      for (++i; i < end; ++i) {
-        swing += answer.free[j](0, i) * begin[axis][i];
-      }
-      off[axis] = swing + place(look.nozzle, answer.ramp[j]) * speed[axis] -
-                  (place(look.nozzle, nozzle(axis, k + j)) - base_mm(k)[a]);
-      off_base[axis] = speed[axis] * look.s * duration - (base_mm(k + j)[a] - base_mm(k)[a]);
-    }
-    const ErrorWeight& w = weight(k + j);
+    const ErrorWeight& w = weight(k + look.j);
     if (!same_weight) {
-      xx += share_s * w.xx * look.x.transpose() * look.x;
-      xy += share_s * w.xy * look.x.transpose() * look.y;
-      yy += share_s * w.yy * look.y.transpose() * look.y;
+      sums.xx += share_s * w.xx * look.x.transpose() * look.x;
+      sums.xy += share_s * w.xy * look.x.transpose() * look.y;
+      sums.yy += share_s * w.yy * look.y.transpose() * look.y;
     }
-    const double to_x = share_s * (w.xx * off[0] + w.xy * off[1]);
-    const double to_y = share_s * (w.xy * off[0] + w.yy * off[1]);
-    slope_x += to_x * look.x;
-    slope_y += to_y * look.y;
-    Row base = Row::Zero();
-    base[2 * kModes] = 1.0 - look.s;
-    base[2 * kModes + 1] = look.s;
-    slope_x += base_weight * off_base[0] * base;
-    slope_y += base_weight * off_base[1] * base;
-    result.constant += 0.5 * (to_x * off[0] + to_y * off[1]) +
-                       0.5 * base_weight * (off_base[0] * off_base[0] + off_base[1] * off_base[1]);
+    add_off(look, off_at(look, chord, k), w, share_s, sums);
   }
+}
+
+template <int kModes>
+void LineCosts<kModes>::write_cost(const RowSums& sums, LineCost<kModes>& result) {
   static constexpr auto kPlacesX = places<kModes>(0);
   static constexpr auto kPlacesY = places<kModes>(1);
   for (int i = 0; i < kRow; ++i) {
@@ -276,14 +294,20 @@ LineCost<kModes> LineCosts<kModes>::line(std::size_t k, std::size_t m) const {
     for (int j = 0; j < kRow; ++j) {
       const int xj = kPlacesX[static_cast<std::size_t>(j)];
       const int yj = kPlacesY[static_cast<std::size_t>(j)];
-      result.matrix(xi, xj) = xx(i, j);
-      result.matrix(xi, yj) = xy(i, j);
-      result.matrix(yj, xi) = xy(i, j);
-      result.matrix(yi, yj) = yy(i, j);
+      result.matrix(xi, xj) = sums.xx(i, j);
+      result.matrix(xi, yj) = sums.xy(i, j);
+      result.matrix(yj, xi) = sums.xy(i, j);
+      result.matrix(yi, yj) = sums.yy(i, j);
     }
-    result.slope[xi] = slope_x[i];
-    result.slope[yi] = slope_y[i];
+    result.slope[xi] = sums.slope_x[i];
+    result.slope[yi] = sums.slope_y[i];
   }
+  result.constant = sums.constant;
+}
+
+template <int kModes>
+void LineCosts<kModes>::write_move(std::size_t k, std::size_t m, const Chord& chord,
+                                   LineCost<kModes>& result) const {
   constexpr int kStates = 2 * kModes;
   for (std::size_t axis = 0; axis < 2; ++axis) {
     const auto a = static_cast<Eigen::Index>(axis);
@@ -295,13 +319,23 @@ LineCost<kModes> LineCosts<kModes>::line(std::size_t k, std::size_t m) const {
           answer.free[m].template middleCols<2>(i);
     }
     result.move.template block<kStates, 1>(first, first + kStates) =
-        answer.step[m] - answer.ramp[m] / duration;
-    result.move.template block<kStates, 1>(first, u) = answer.ramp[m] / duration;
+        answer.step[m] - answer.ramp[m] / chord.duration_s;
+    result.move.template block<kStates, 1>(first, u) = answer.ramp[m] / chord.duration_s;
     result.move(first + kStates, u) = 1.0;
     result.shift.template segment<kStates>(first) =
-        answer.after(m, begin[axis]) + answer.ramp[m] * speed[axis] -
+        answer.after(m, chord.begin[axis]) + answer.ramp[m] * chord.speed_mm_s[axis] -
         (nozzle(axis, k + m) - riding(axis, base_mm(k)[a]));
   }
+}
+
+template <int kModes>
+LineCost<kModes> LineCosts<kModes>::line(std::size_t k, std::size_t m) const {
+  const Chord chord = this->chord(k, m);
+  RowSums sums;
+  add_looks(k, m, chord, sums);
+  LineCost<kModes> result;
+  write_cost(sums, result);
+  write_move(k, m, chord, result);
   return result;
 }
 

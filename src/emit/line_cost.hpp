@@ -110,7 +110,7 @@ template <int kModes>
 // and a ramp of the base.
 template <int kModes>
 struct NozzleAnswers {
-  // What each mode makes of its own state: one block of 2 × 2 beside the other.
+  // How the state of each mode follows from its own state: one block of 2 × 2 beside the other.
   using Free = Eigen::Matrix<double, 2, 2 * kModes>;
   std::vector<Free> free;
   std::vector<ModesVector<kModes>> step;
@@ -155,7 +155,7 @@ class Candidates {
   std::vector<ErrorWeight> weights_;
 };
 
-// What lines between candidates cost.
+// The costs of lines between candidates.
 template <int kModes>
 class LineCosts : public Candidates {
  public:
@@ -168,7 +168,7 @@ class LineCosts : public Candidates {
   [[nodiscard]] std::pair<std::size_t, std::size_t> entries(std::size_t nozzle) const {
     return {2 * nozzle * modes_each_, 2 * (nozzle + 1) * modes_each_};
   }
-  // The place of a nozzle in this state: the sum of those of its modes.
+  // The place of a nozzle in this state: the sum of its modes' places.
   [[nodiscard]] double place(std::size_t nozzle, const ModesVector<kModes>& state) const {
     auto [i, end] = entries(nozzle);
     double sum = state[i];
@@ -197,9 +197,9 @@ class LineCosts : public Candidates {
   // rules.max_line_s.
   [[nodiscard]] LineCost<kModes> line(std::size_t k, std::size_t m) const;
 
-  // What the lead of a line (planner::PlannedMove::lead_s) adds to z at the line's end, for a line
-  // of `steps` steps at speed_mm_s behind one at before_mm_s. The line lasts no longer than
-  // rules.max_line_s.
+  // The kick that the lead of a line (planner::PlannedMove::lead_s) adds to z at the line's end.
+  // The line has `steps` steps at speed_mm_s, and comes after a line at before_mm_s. It lasts no
+  // longer than rules.max_line_s.
   [[nodiscard]] ZVector<kModes> lead_kick(double line_s, double steps,
                                           const Eigen::Vector2d& speed_mm_s,
                                           double before_mm_s) const;
@@ -212,8 +212,8 @@ class LineCosts : public Candidates {
   static constexpr int kRow = kOfAxis<kModes> + 1;
   using Row = Eigen::Matrix<double, 1, kRow>;
   using RowSquare = Eigen::Matrix<double, kRow, kRow>;
-  // What all lines over m candidates share: the nozzles' places on the axes by (e, o, u) at some
-  // moments, and the sums of their squares.
+  // The nozzles' places on the axes by (e, o, u) at some moments, and the sums of their squares.
+  // All lines over m candidates share them.
   struct Look {
     std::size_t j = 0;       // candidates since the line's begin
     double s = 0.0;          // j as a share of the line
@@ -230,6 +230,39 @@ class LineCosts : public Candidates {
     RowSquare base = RowSquare::Zero();
   };
   [[nodiscard]] Shape shape(std::size_t m) const;
+
+  // The motion that the chord from b_k to b_{k+m} alone would make.
+  struct Chord {
+    double duration_s = 0.0;
+    std::array<ModesVector<kModes>, 2> begin;  // nozzles relative to b_k
+    std::array<double, 2> speed_mm_s{};
+  };
+  [[nodiscard]] Chord chord(std::size_t k, std::size_t m) const;
+
+  // How far the chord's motion is from the nozzle and from the base at a look.
+  struct Off {
+    std::array<double, 2> nozzle_mm{};
+    std::array<double, 2> base_mm{};
+  };
+  [[nodiscard]] Off off_at(const Look& look, const Chord& chord, std::size_t k) const;
+
+  // J by (e, o, u) of both axes.
+  struct RowSums {
+    RowSquare xx;
+    RowSquare xy = RowSquare::Zero();
+    RowSquare yy;
+    Row slope_x = Row::Zero();
+    Row slope_y = Row::Zero();
+    double constant = 0.0;
+  };
+  void add_looks(std::size_t k, std::size_t m, const Chord& chord, RowSums& sums) const;
+  // share_s: the time that the look stands for.
+  static void add_off(const Look& look, const Off& off, const ErrorWeight& w, double share_s,
+                      RowSums& sums);
+  // Writes H, h and c.
+  static void write_cost(const RowSums& sums, LineCost<kModes>& result);
+  // Writes M and m.
+  void write_move(std::size_t k, std::size_t m, const Chord& chord, LineCost<kModes>& result) const;
 
   struct Axis {
     std::vector<dynamics::FlexibleAxis> models;  // one for each nozzle

@@ -12,7 +12,7 @@
 namespace unflex::emit {
 namespace {
 
-// Over so many neighbouring knots smoothing reaches, mostly, and where lines are short.
+// How many neighbouring knots smoothing reaches over: mostly, and where lines are short.
 constexpr int kMostly = 18;
 constexpr int kShortLines = 40;
 

@@ -85,7 +85,7 @@ int feed_decimals(double feed_mm_min, double duration_s) {
 // precision (Emitter::write_stroke, keep_reading_of_e_within).
 class ReadingOfE {
  public:
-  // The reading at both ends of the line that ends with so much filament laid.
+  // The reading at both ends of the line. e_mm: the filament laid at its end.
   gcode::ReadingOfE until(double e_mm) {
     if (std::abs(mm_) > kMostReadingOfE_mm) {
       mm_ = 0.0;

@@ -1,7 +1,6 @@
 #include "strokes.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
 
@@ -11,6 +10,7 @@
 #include "nozzle_progress.hpp"
 #include "speeds.hpp"
 #include "step_path.hpp"
+#include "stroke_cutter.hpp"
 #include "timetable.hpp"
 #include "unflex/core/math.hpp"
 #include "unflex/core/number.hpp"
@@ -20,9 +20,6 @@ namespace unflex::emit {
 namespace {
 
 using gcode::Z;
-
-// On a grid this coarse, rounding is what limits accuracy.
-constexpr double kCoarse_mm = 1e-3;
 
 // Moments at which a line should end, in order: where other lines stand between moves, where
 // filament per mm changes, and where the motion begins and ends.
@@ -116,24 +113,6 @@ gcode::Position start_position(const Run& run, const Grid& grid) {
   return start;
 }
 
-// Whether the line is long enough for the firmware to move at once, and not only with the next
-// line.
-bool goes_through(const Stroke& from, const Stroke& to, const Grid& grid, const LineRules& rules) {
-  const double steps = most_of_axes(
-      [](double way_mm, const AxisGrid& axis) { return std::abs(way_mm) / axis.step_mm; },
-      to.place_mm - from.place_mm, grid);
-  return steps > rules.min_steps - 0.5;
-}
-
-XY velocity_mm_s(const Stroke& from, const Stroke& to) {
-  return (to.place_mm - from.place_mm) / (to.end_s - from.end_s);
-}
-
-// Whether a motor would change its speed by more than it may.
-bool turns_quickly(const XY& before, const XY& after, const LineRules& rules) {
-  return rules.motors.largest_of_xy(after - before) > rules.max_speed_step_mm_s;
-}
-
 // Whether t is near a sharp corner, or near the end of the run, beyond which the path does not go
 // on.
 bool is_at_corner(const Run& run, const Timetable& table, std::size_t move, double t) {
@@ -225,7 +204,7 @@ Polygon polygon(const Run& run, const Timetable& table, const NozzleProgress& no
                 const std::vector<double>& wanted, const Grid& grid, const LineRules& rules,
                 const EmitOptions& options) {
   const dynamics::BaseTrajectory& base = *run.base;
-  if (any_axis([](const AxisGrid& axis) { return axis.step_mm > kCoarse_mm; }, grid)) {
+  if (any_axis([](const AxisGrid& axis) { return axis.is_coarse(); }, grid)) {
     return step_path(
         base, wanted, [&](double t) { return error_weight(run, table, t); },
         {start_of_lines(run, grid), xy_of(end_of_lines(run, table, grid)), run.lines_before_s,
@@ -257,51 +236,6 @@ Polygon polygon(const Run& run, const Timetable& table, const NozzleProgress& no
           map_axes([](const AxisVertices& axis) { return axis.position_mm; }, vertices)};
 }
 
-// How much of its change of Z a line can take. The line must not become steep, nor slow: Z has
-// limits of its own, which a run leaves as they are. The rest waits for other lines, as long as it
-// is too small to be seen. `before` and `after` are the velocities of the neighbouring lines.
-double change_of_z_mm(const Stroke& from, const Stroke& to, const XY& before, const XY& after,
-                      const Grid& grid, const EmitOptions& options) {
-  constexpr double kUnseen_mm = 0.01;
-  // Share of the line's time that ramps may take. F makes up for them, so F changes more than the
-  // speed does.
-  constexpr double kRamps = 0.03;
-  const double length_mm = distance(from.place_mm, to.place_mm);
-  const double dz = to.z_mm - from.z_mm;
-  double most = 2.0 * gcode::kMaxSlope * length_mm;
-  if (std::abs(dz) < kUnseen_mm) {
-    const double duration_s = to.end_s - from.end_s;
-    const XY own = velocity_mm_s(from, to);
-    // Where the path bends, a line has to slow down as if it had a ramp.
-    const auto change_mm_s = [&](const XY& other) { return distance(other, own); };
-    const ZLimits limits = z_limits(options.fixed, options.run_limits);
-    most = std::min({most, limits.speed_mm_s * duration_s,
-                     kRamps * limits.accel_mm_s2 * length_mm * duration_s /
-                         std::max(change_mm_s(before), change_mm_s(after))});
-  }
-  if (std::abs(dz) <= most) {
-    return dz;
-  }
-  return std::copysign(std::floor(most / grid.z.step_mm) * grid.z.step_mm, dz);
-}
-
-// The run must end at its height. What the last line cannot take of the change of Z, the lines
-// before it take. `after`: the velocity behind the last line.
-void climb_in_time(const Stroke& start, XY after, const Grid& grid, const EmitOptions& options,
-                   std::vector<Stroke>& strokes) {
-  for (std::size_t i = strokes.size(); i-- > 1;) {
-    const XY before = velocity_mm_s(i > 1 ? strokes[i - 2] : start, strokes[i - 1]);
-    const double change_mm =
-        change_of_z_mm(strokes[i - 1], strokes[i], before, after, grid, options);
-    const double left_mm = strokes[i].z_mm - strokes[i - 1].z_mm - change_mm;
-    if (left_mm == 0.0) {
-      return;
-    }
-    strokes[i - 1].z_mm += left_mm;
-    after = velocity_mm_s(strokes[i - 1], strokes[i]);
-  }
-}
-
 // The velocity with which a part of a run begins and ends.
 Passing passing(const Run& run) {
   const auto velocity = [&](double t) {
@@ -318,6 +252,26 @@ Passing passing(const Run& run) {
     result.out_mm_s = velocity(*run.until_s);
   }
   return result;
+}
+
+LineRules rules_for(const Run& run, const EmitOptions& options) {
+  LineRules rules = options.lines;
+  rules.tolerance_mm *= run.tolerance_share;
+  rules.burst_lines = static_cast<int>(run.limits_share * rules.burst_lines);
+  rules.max_accel_mm_s2 *= run.limits_share;
+  return rules;
+}
+
+// The text ends where the file does, by a line that the firmware skips as it skips the file's last
+// move.
+Stroke skipped_stroke(const Run& run, double file_start_e_mm, const Stroke& last) {
+  const gcode::Position file_end = end_of_moves(run);
+  Stroke rest = last;
+  rest.place_mm = xy_of(file_end);
+  rest.z_mm = file_end[Z];
+  rest.e_mm = file_end[gcode::E] - file_start_e_mm;
+  rest.is_skipped = true;
+  return rest;
 }
 
 }  // namespace
@@ -343,89 +297,40 @@ void give_length(const Stroke& next, const Grid& grid, const LineRules& rules, S
 std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions& options) {
   const Timetable table(run);
   const std::vector<double> event_times_s = table.event_times_s();
-  LineRules rules = options.lines;
-  rules.tolerance_mm *= run.tolerance_share;
-  rules.burst_lines = static_cast<int>(run.limits_share * rules.burst_lines);
-  rules.max_accel_mm_s2 *= run.limits_share;
+  const LineRules rules = rules_for(run, options);
   const NozzleProgress nozzle(run, table.starts_s(), rules.nozzle);
   const Polygon vertices = polygon(
       run, table, nozzle, wanted_times(run, table, event_times_s, nozzle, options.has_free_timing),
       grid, rules, options);
-  const std::vector<double>& times = vertices.times_s;
-  if (times.empty()) {
+  if (vertices.times_s.empty()) {
     return {};
   }
   const gcode::Position start = start_position(run, grid);
   const gcode::Position end = end_of_lines(run, table, grid);
-  std::vector<Stroke> result;
+  const Stroke from{0.0, xy_of(start), start[Z]};
+  const Passing ends = passing(run);
+  BareStrokes bare =
+      cut_strokes(table, vertices, event_times_s, grid, rules, options, from, end, ends);
+  std::vector<Stroke>& result = bare.strokes;
+  if (result.empty()) {
+    return {};
+  }
+  result.back().place_mm = xy_of(end);
+  result.back().z_mm = end[Z];
+  climb_in_time(from, ends.out_mm_s.value_or(XY{}), grid, options, result);
   const double file_start_e_mm = start_of(run)[gcode::E];
   const RunFilament filament{end[gcode::E] - file_start_e_mm, file_start_e_mm - start[gcode::E]};
-  std::vector<double> ends_s;  // of the strokes
-  std::size_t laying = 0;  // lines that lay the run's filament; lines of the tail come after them
-  Stroke last{0.0, xy_of(start), start[Z]};
-  double dropped_s = times.front();
-  std::size_t event = 0;
-  const Passing ends = passing(run);
-  XY before = ends.in_mm_s.value_or(XY{});
-  for (std::size_t i = 1; i < times.size(); ++i) {
-    Stroke stroke;
-    stroke.end_s = times[i] - dropped_s;
-    const bool is_end = i + 1 == times.size();
-    stroke.place_mm = is_end ? xy_of(end) : vertices.place_mm(i);
-    stroke.z_mm = is_end ? end[Z] : grid.z.nearest(table.height_mm(times[i]));
-    // An event goes before the stroke that begins nearest to its moment.
-    while (event < event_times_s.size() &&
-           event_times_s[event] <= times[i] - 0.5 * rules.min_line_s) {
-      ++event;
-    }
-    stroke.events = event;
-    if (!is_end) {
-      const Stroke next{times[i + 1] - dropped_s, vertices.place_mm(i + 1)};
-      if (grid.x.step_mm <= kCoarse_mm && !result.empty() &&
-          !goes_through(last, stroke, grid, rules) &&
-          turns_quickly(before, velocity_mm_s(last, next), rules)) {
-        // The base rests here while it turns round. A line without a length would become part of
-        // the next one.
-        give_length(next, grid, rules, stroke);
-      }
-      stroke.z_mm = last.z_mm + change_of_z_mm(last, stroke, before, velocity_mm_s(stroke, next),
-                                               grid, options);
-    }
-    if (goes_through(last, stroke, grid, rules)) {
-      before = velocity_mm_s(last, stroke);
-      laying += laying == result.size() && !table.tail_at(times[i - 1]) ? 1 : 0;
-      result.push_back(stroke);
-      ends_s.push_back(times[i]);
-      last = stroke;
-    } else if (result.empty()) {
-      dropped_s += times[i] - times[i - 1];
-    }
+  lay_filament(run, table, nozzle, filament, start, bare.ends_s, bare.laying, options, result);
+  if (skips_last_move(run, grid)) {
+    result.push_back(skipped_stroke(run, file_start_e_mm, result.back()));
   }
-  if (!result.empty()) {
-    Stroke& final = result.back();
-    final.place_mm = xy_of(end);
-    final.z_mm = end[Z];
-    climb_in_time({0.0, xy_of(start), start[Z]}, ends.out_mm_s.value_or(XY{}), grid, options,
-                  result);
-    lay_filament(run, table, nozzle, filament, start, ends_s, laying, options, result);
-    if (skips_last_move(run, grid)) {
-      // The text ends where the file does, by a line that the firmware skips as well.
-      const gcode::Position file_end = end_of_moves(run);
-      Stroke rest = result.back();
-      rest.place_mm = xy_of(file_end);
-      rest.z_mm = file_end[Z];
-      rest.e_mm = file_end[gcode::E] - file_start_e_mm;
-      rest.is_skipped = true;
-      result.push_back(rest);
-    }
-    time_strokes(run, grid, options, result);
-  }
-  return result;
+  time_strokes(run, grid, options, result);
+  return std::move(bare.strokes);
 }
 
 void time_strokes(const Run& run, const Grid& grid, const EmitOptions& options,
                   std::vector<Stroke>& strokes) {
-  // What the firmware skips takes no time.
+  // A stroke that the firmware skips takes no time.
   std::optional<Stroke> skipped;
   if (!strokes.empty() && strokes.back().is_skipped) {
     skipped = strokes.back();

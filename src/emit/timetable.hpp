@@ -27,8 +27,8 @@ class Timetable {
   // keeps the slope small where the base is slower than the plan.
   [[nodiscard]] double height_mm(double t) const;
 
-  // Whether filament per mm changes so much at the boundary before move i that a line across it
-  // would give either move too much or too little.
+  // Whether a line across the boundary before move i would give either move too much filament or
+  // too little, since filament per mm changes there.
   [[nodiscard]] bool filament_changes(std::size_t i) const;
 
   // The time at which each event stands: the end of the moves before it.

@@ -76,8 +76,8 @@ struct Bounds {
   }
 };
 
-// What all lines of so many steps of one length share: where they take (y, o), what that costs, and
-// how the cost's slope follows from what the chord is off at each step.
+// All lines with the same number of steps of one length share this: where they take (y, o), the
+// cost of that, and how the slope of the cost follows from the chord's error at each step.
 template <int kModes>
 struct Shape {
   static constexpr int kAll = kOfAll<kModes>;

@@ -58,21 +58,17 @@ void set_bounds(const SpeedSteps& most, double before_mm_s, double after_mm_s, c
       bounds(stages.size(), 0.5 * last.duration_s, !ends.to_rest, last.chord_mm_s - after_mm_s);
 }
 
+// The lines of a run as stages.
 template <int kModes>
-AxisVertices choose_vertices(const BaseTrajectory& base, std::size_t axis,
-                             const FlexibleAxis& nozzle, const Followed& followed,
-                             const std::vector<double>& times, const AxisGrid& grid,
-                             const Reach& reach, const SpeedSteps& most, Ends ends) {
-  constexpr int kZ = kOfZ<kModes>;
-  const std::size_t lines = times.size() - 1;
+struct RunStages {
   // By length of a step, and by that and their number; most lines are of a few lengths.
   std::map<std::int64_t, Steps<kModes>> steps;
   std::map<std::pair<std::int64_t, int>, Shape<kModes>> shapes;
   std::vector<Stage<kModes>> stages;
-  stages.reserve(lines);
-  std::vector<double> on_curve = {base.at(base[axis], 0.0).position_mm};
-  for (std::size_t k = 0; k < lines; ++k) {
-    const double duration = times[k + 1] - times[k];
+
+  void add(const BaseTrajectory& base, std::size_t axis, const FlexibleAxis& nozzle,
+           const Followed& followed, double begin_s, double end_s) {
+    const double duration = end_s - begin_s;
     const int count = static_cast<int>(std::ceil(duration / base.period_s - 1e-9));
     const double dt = duration / count;
     constexpr double kSame_s = 1e-12;
@@ -82,7 +78,23 @@ AxisVertices choose_vertices(const BaseTrajectory& base, std::size_t axis,
     if (shape == shapes.end()) {
       shape = shapes.emplace(std::pair{length, count}, shape_of(step, count)).first;
     }
-    stages.push_back(stage(base, axis, followed, step, shape->second, times[k], times[k + 1]));
+    stages.push_back(stage(base, axis, followed, step, shape->second, begin_s, end_s));
+  }
+};
+
+template <int kModes>
+AxisVertices choose_vertices(const BaseTrajectory& base, std::size_t axis,
+                             const FlexibleAxis& nozzle, const Followed& followed,
+                             const std::vector<double>& times, const AxisGrid& grid,
+                             const Reach& reach, const SpeedSteps& most, Ends ends) {
+  constexpr int kZ = kOfZ<kModes>;
+  const std::size_t lines = times.size() - 1;
+  RunStages<kModes> run;
+  std::vector<Stage<kModes>>& stages = run.stages;
+  stages.reserve(lines);
+  std::vector<double> on_curve = {base.at(base[axis], 0.0).position_mm};
+  for (std::size_t k = 0; k < lines; ++k) {
+    run.add(base, axis, nozzle, followed, times[k], times[k + 1]);
     on_curve.push_back(base.at(base[axis], times[k + 1]).position_mm);
   }
   Ending<kModes> ending;

@@ -17,6 +17,8 @@ struct AxisGrid {
   double step_mm = 1e-4;
 
   [[nodiscard]] double nearest(double position_mm) const;
+  // Whether rounding to the grid limits accuracy.
+  [[nodiscard]] bool is_coarse() const { return step_mm > 1e-3; }
 };
 [[nodiscard]] inline XY nearest(const Axes<AxisGrid>& grid, const XY& place_mm) {
   return map_axes([](const AxisGrid& axis, double at_mm) { return axis.nearest(at_mm); }, grid,

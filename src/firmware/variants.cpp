@@ -28,7 +28,7 @@ constexpr std::string_view kMarlin10 = "marlin_1_0";
 // older ones (MK3S, MK2.5) run an 8 bit Marlin of Prusa's own.
 constexpr std::array<std::string_view, 7> kBuddyModels = {"mini", "mk3.5", "mk3.9",  "mk4",
                                                           "xl",   "ix",    "coreone"};
-// What may follow a model: its revision, tools, multi material unit.
+// Endings that may follow a model: its revision, tools, multi material unit.
 constexpr std::array<std::string_view, 14> kModelEndings = {
     "", "s", "is", "mmu3", "smmu3", "ismmu3", "l", "lmmu3", "2", "5", "2is", "5is", "+", "plus"};
 
@@ -215,7 +215,7 @@ void marlin_linear_advance(Draft& draft) {
   }
   constexpr std::size_t kE = 3;
   const double root = std::numbers::sqrt2 / 2.0;
-  const double jerk_mm_s = s.printer.classic_jerk
+  const double jerk_mm_s = s.printer.junctions.classic_jerk
                                ? s.jerk_mm_s()[kE]
                                : std::sqrt(root * s.limits.junction_deviation_mm *
                                            s.axis_max_accel_mm_s2()[kE] / (1.0 - root));

@@ -93,15 +93,15 @@ PassOutcome pass(const Job& job, const Engines& engines, const std::vector<verif
 
 // The report lists single runs that were kept. If all were kept, warn the user.
 bool warn_of_no_run(const Job& job, report::Report& report) {
-  if (report.runs_total == 0 || report.runs_compensated > 0 || report.fallbacks.empty()) {
+  if (report.runs.total == 0 || report.runs.compensated > 0 || report.runs.fallbacks.empty()) {
     return false;
   }
-  const report::Fallback& first = report.fallbacks.front();
+  const report::Fallback& first = report.runs.fallbacks.front();
   report.warnings.push_back(to_string(Diagnostic{
       {job.input_name, first.first_line},
       fmt::format("nothing is compensated: {} as sliced, this one since {}",
-                  report.runs_total == 1 ? "its only run stays"
-                                         : fmt::format("all {} runs stay", report.runs_total),
+                  report.runs.total == 1 ? "its only run stays"
+                                         : fmt::format("all {} runs stay", report.runs.total),
                   first.reason)}));
   return true;
 }
@@ -111,11 +111,11 @@ bool warn_of_no_run(const Job& job, report::Report& report) {
 void warn_of_no_gain(const Job& job, report::Report& report) {
   constexpr double kWorse = 1.05;
   constexpr double kWorse_mm = 2e-4;
-  if (report.free_timing.is_kept()) {
+  if (report::keeps_tolerance(report)) {
     return;  // it was to be faster, and is as exact as it was to be
   }
-  const double now_mm = report.uncompensated.extruding.contour_rms_mm;
-  const double compensated_mm = report.compensated.extruding.contour_rms_mm;
+  const double now_mm = report.measured.uncompensated.extruding.contour_rms_mm;
+  const double compensated_mm = report.measured.compensated.extruding.contour_rms_mm;
   if (compensated_mm <= kWorse * now_mm + kWorse_mm) {
     return;
   }
@@ -130,7 +130,7 @@ void warn_of_no_gain(const Job& job, report::Report& report) {
 void warn_of_gap(const Job& job, report::Report& report) {
   constexpr double kMostGap = 1e-5;
   constexpr double kMost_mm = 5e-4;
-  const report::SolverCheck& check = report.solver_check;
+  const report::SolverCheck& check = report.solver.check;
   if (check.largest_gap <= kMostGap && check.largest_difference_mm <= kMost_mm) {
     return;
   }
@@ -182,7 +182,7 @@ Result<report::Report> compensate_with(const Job& job, const Engines& engines, P
   std::vector<verify::BlamedRun> kept;
   for (int number = 1;; ++number) {
     report::Report report = new_report("compensate", job);
-    report.solver_engine = name_of(engines);
+    report.solver.engine = name_of(engines);
     PassOutcome outcome = pass(job, engines, kept, number == kMostPasses, progress, report);
     if (!outcome.blamed.empty() && number < kMostPasses && can_repeat(job) &&
         !progress.cancelled()) {
@@ -192,12 +192,13 @@ Result<report::Report> compensate_with(const Job& job, const Engines& engines, P
     if (!outcome.status) {
       return tl::unexpected(outcome.status.error());
     }
-    if (report.reference_time_s > 0.0 && !job.output_stream) {
+    if (report.measured.uncompensated.time_s > 0.0 && !job.output_stream) {
       if (!job.settings.is_timing_free()) {
         outcome.time_notes.clear();  // all of the print takes about as much longer
       }
-      if (Status status = retime(*job.output, job.output_name, outcome.time_notes,
-                                 {0, report.reference_time_s, report.emitted_time_s});
+      if (Status status =
+              retime(*job.output, job.output_name, outcome.time_notes,
+                     {0, report.measured.uncompensated.time_s, report.measured.compensated.time_s});
           !status) {
         return tl::unexpected(status.error());
       }
@@ -206,7 +207,7 @@ Result<report::Report> compensate_with(const Job& job, const Engines& engines, P
       return tl::unexpected(status.error());
     }
     if (!job.output_stream) {
-      report.output_bytes = static_cast<std::size_t>(job.output->bytes().value_or(0));
+      report.measured.output.bytes = static_cast<std::size_t>(job.output->bytes().value_or(0));
     }
     if (!warn_of_no_run(job, report)) {
       std::ranges::move(run::remarks(report.extruded_path, report.unknown_commands, job.input_name),

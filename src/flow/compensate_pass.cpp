@@ -265,7 +265,7 @@ class Compensator {
   void lay_out(const std::shared_ptr<run::RunJob>& job) {
     run::stretch(*job);
     run::lay_out(*job);
-    report_->windows_total += compensate::windows_to_solve(job->windows.spans);
+    report_->runs.windows_total += compensate::windows_to_solve(job->windows.spans);
     if (gaps_) {
       gaps_->choose(*job);
     }
@@ -345,7 +345,7 @@ class Compensator {
     if (job.piece.is_run) {
       band_gain_.add(job);
     }
-    report_->solver_iterations += job.iterations;
+    report_->solver.iterations += job.iterations;
     if (gaps_) {
       gaps_->take(job);
     }
@@ -374,7 +374,7 @@ class Compensator {
     processes_.submit(*gaps_);
     const CpuSlot::Without without(*slots_);
     while (processes_.under_way() > 0) {
-      processes_.take(*gaps_, static_cast<int>(kPatience.count()), report_->solver_check);
+      processes_.take(*gaps_, static_cast<int>(kPatience.count()), report_->solver.check);
       if (progress_.cancelled()) {
         return fail(ErrorKind::internal, "cancelled");
       }

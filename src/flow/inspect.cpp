@@ -100,7 +100,7 @@ class Inspector {
     if (result_->min_mm.x > result_->max_mm.x) {
       result_->min_mm = result_->max_mm = {};
     }
-    if (result_->moves == 0) {
+    if (result_->counts.moves == 0) {
       result_->lowest_accel_mm_s2 = 0.0;
     }
     if (linear_moves_ > 0) {
@@ -121,13 +121,13 @@ class Inspector {
       plan(event);
       return;
     }
-    ++result_->lines;
-    result_->bytes += event.line.text.size();
+    ++result_->counts.lines;
+    result_->counts.bytes += event.line.text.size();
     const bool stops_nothing =
         event.kind == gcode::EventKind::passive || event.kind == gcode::EventKind::border;
-    result_->passive_lines += stops_nothing ? 1 : 0;
-    result_->limit_lines += event.kind == gcode::EventKind::limits ? 1 : 0;
-    result_->barrier_lines += event.kind == gcode::EventKind::barrier ? 1 : 0;
+    result_->counts.passive_lines += stops_nothing ? 1 : 0;
+    result_->counts.limit_lines += event.kind == gcode::EventKind::limits ? 1 : 0;
+    result_->counts.barrier_lines += event.kind == gcode::EventKind::barrier ? 1 : 0;
     result_->reference_time_s += event.dwell_s;
     if (event.line.content().starts_with("G1 ")) {
       ++linear_moves_;  // most lines are such; the event has their content
@@ -161,7 +161,7 @@ class Inspector {
     if (command.kind != gcode::CommandKind::none) {
       ++result_->commands[command_name(command)];
     }
-    result_->arcs += command.is('G', 2) || command.is('G', 3) ? 1 : 0;
+    result_->counts.arcs += command.is('G', 2) || command.is('G', 3) ? 1 : 0;
     absolute_e_ = command.is('M', 82) || (absolute_e_ && !command.is('M', 83));
   }
 
@@ -190,14 +190,14 @@ class Inspector {
     result_->reference_time_s += move.duration_s();
     steps_.play(move);
     if (!move.kinematic) {
-      ++result_->extrude_only_moves;
+      ++result_->counts.extrude_only_moves;
       return;
     }
-    ++result_->moves;
+    ++result_->counts.moves;
     result_->moving_time_s += move.duration_s();
     result_->path_length_mm += move.length_mm;
     if (segment.extruding()) {
-      ++result_->extruding_moves;
+      ++result_->counts.extruding_moves;
       for_each_axis(
           [](double& min_mm, double& max_mm, double start_mm, double end_mm) {
             min_mm = std::min({min_mm, start_mm, end_mm});
@@ -240,7 +240,7 @@ Result<Inspection> inspect(const Job& job, Progress& progress) {
     for (const std::unique_ptr<run::Piece>& piece : read) {
       inspector.add(*piece, setup);
     }
-    progress.update("reading", share_of_input(static_cast<double>(result.bytes), bytes));
+    progress.update("reading", share_of_input(static_cast<double>(result.counts.bytes), bytes));
     if (progress.cancelled()) {
       return fail(ErrorKind::internal, "cancelled");
     }

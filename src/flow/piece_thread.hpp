@@ -48,7 +48,7 @@ class PieceThread {
   // Reads a piece into `piece`. Returns whether there was one, and sets `error` if it could not be
   // read.
   bool read_piece(run::Piece& piece, std::optional<Error>& error);
-  // Where the library has no threads, reads on until so many lines wait, or the input ends.
+  // Where the library has no threads, reads on until `lines` lines wait, or the input ends.
   void read_here(std::size_t lines);
   // Ends the thread with the exception that is being handled; error() throws it again.
   void give_up();

@@ -77,7 +77,7 @@ class RunQueue {
  private:
   // Per worker: nodes of runs that may be read and not yet written.
   static constexpr std::size_t kNodesAhead = 30'000;
-  // At most so many lines may wait. It bounds memory where moves are tiny.
+  // The most lines that may wait. It bounds memory where moves are tiny.
   static constexpr std::size_t kLinesAhead = 200'000;
 
   unsigned workers_;

@@ -22,18 +22,6 @@ report::StepRates::Row row(const verify::StepRate& sliced, const verify::StepRat
 
 }  // namespace
 
-verify::StepRules step_rules(const machine::Settings& settings) {
-  const machine::StepLimits limits = settings.step_limits();
-  verify::StepRules rules;
-  rules.max_hz = limits.max_hz;
-  rules.max_total_hz = limits.max_total_hz;
-  rules.max_shared_hz = limits.max_shared_hz;
-  for (std::size_t i = 0; i < rules.steps_per_mm.size(); ++i) {
-    rules.steps_per_mm[i] = settings.printer.steps_per_mm[i].value_or(0.0);
-  }
-  return rules;
-}
-
 void add_step_limits(const machine::Settings& settings, report::StepRates& rates) {
   const machine::StepLimits limits = settings.step_limits();
   rates.max_hz = limits.max_hz;

@@ -10,9 +10,6 @@
 
 namespace unflex::flow {
 
-// The steps per mm that the settings tell, and the limits.
-[[nodiscard]] verify::StepRules step_rules(const machine::Settings& settings);
-
 // Puts the rates into rows, the limits stay as they are. emitted: nullptr if there is no output.
 void add_step_rates(const verify::StepRates& sliced, const verify::StepRates* emitted,
                     report::StepRates& rates);

@@ -24,34 +24,6 @@
 namespace unflex::flow {
 namespace {
 
-report::DeviationRow row(const verify::DeviationStats& stats) {
-  return {stats.contour_max_mm,  stats.contour_p99_mm, stats.contour_rms_mm,  stats.tracking_max_mm,
-          stats.tracking_rms_mm, stats.duration_s,     stats.contour_max_line};
-}
-
-report::CornerRow row(const verify::CornerStats& stats) {
-  return {stats.count, stats.rms_mm, stats.p99_mm, stats.max_mm, stats.max_line};
-}
-
-report::WidthRow row(const verify::WidthStats& stats) {
-  return {stats.rms, stats.p99, stats.largest, stats.wide, stats.line};
-}
-
-report::LineRow row(const verify::LineStats& stats) {
-  return {row(stats.width),
-          {stats.edge.rms_mm, stats.edge.p99_mm, stats.edge.max_mm, stats.edge.line},
-          row(stats.other[0]),
-          row(stats.other[1]),
-          row(stats.other[2]),
-          row(stats.other[3]),
-          {stats.first.rms, stats.first.mean},
-          {stats.last.rms, stats.last.mean}};
-}
-
-report::FlowRow row(const verify::FlowStats& stats) {
-  return {stats.max_mm3_s, stats.max_line, stats.max_change_mm3_s2, stats.max_change_line};
-}
-
 // Tells where the hotend may not melt what the output lays.
 std::string too_much_text(const verify::TooMuchFlow& flow, double max_flow_mm3_s,
                           const std::string& output) {
@@ -67,17 +39,13 @@ report::Spread spread(const verify::Deviation& deviation) {
   return {deviation.extruding.contour_max_mm, deviation.extruding.contour_rms_mm};
 }
 
-report::DeviationRows rows(const verify::Deviation& deviation) {
-  return {row(deviation.extruding), row(deviation.all)};
-}
-
 }  // namespace
 
 void add_performance(std::chrono::steady_clock::time_point begin, report::Report& report) {
-  report.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  report.cpu_s = platform::processor_s();
-  report.print_s_per_wall_s = report.reference_time_s / report.wall_s;
-  report.peak_rss_mb = platform::peak_memory_mb();
+  const double wall_s =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  report.performance = {wall_s, platform::processor_s(),
+                        report.measured.uncompensated.time_s / wall_s, platform::peak_memory_mb()};
 }
 
 report::Report new_report(std::string command, const Job& job) {
@@ -127,17 +95,7 @@ verify::Observation observation_of(record::Recorder& recorder, const verify::Rul
 void add_verification(const verify::VerifyReport& verified, record::Recorder& recorder,
                       report::Report& report) {
   report.recording = recorder.finish(verified);
-  report.uncompensated = rows(verified.uncompensated);
-  if (verified.unshaped) {
-    report.unshaped = rows(*verified.unshaped);
-  }
-  report.compensated = rows(verified.compensated);
-  report.uncompensated_corners = row(verified.uncompensated_corners);
-  report.compensated_corners = row(verified.compensated_corners);
-  if (verified.uncompensated_line.length_mm > 0.0) {
-    report.laid_line = {verified.uncompensated_line.length_mm, row(verified.uncompensated_line),
-                        row(verified.compensated_line)};
-  }
+  report.measured = verified.measured;
   constexpr std::size_t kErrors = verify::kFrequencyErrors.size();
   for (std::size_t i = 0; i < verified.detuned.size(); ++i) {
     const report::Spread before = spread(verified.detuned[i].uncompensated);
@@ -148,43 +106,13 @@ void add_verification(const verify::VerifyReport& verified, record::Recorder& re
       report.plants.push_back({before, after});
     }
   }
-  report.reference_time_s = verified.reference_time_s;
-  report.emitted_time_s = verified.emitted_time_s;
-  report.base_max_velocity_mm_s = verified.base_max_velocity_mm_s;
-  report.base_max_accel_mm_s2 = verified.base_max_accel_mm_s2;
-  report.base_max_step_mm_s = verified.base_max_step_mm_s;
-  report.base_accel_limit_mm_s2 = verified.base_accel_limit_mm_s2;
-  report.output_lines = verified.output_lines;
-  report.output_bytes = verified.output_bytes;
-  report.max_lines_per_s = verified.max_lines_per_s;
-  report.segment_ms_median = verified.segment_ms_median;
-  report.worst_run_drift_ms = verified.worst_run_drift_s * 1e3;
-  report.input_extrusion_mm = verified.input_extrusion_mm;
-  report.output_extrusion_mm = verified.output_extrusion_mm;
-  report.worst_move_extrusion_error_mm = verified.worst_move_extrusion_error_mm;
-  const auto lag = [](const verify::LagStats& stats) {
-    return report::Report::FilamentLag{stats.rms_mm, stats.max_mm, stats.max_line};
-  };
-  report.uncompensated_lag = lag(verified.uncompensated_lag);
-  report.compensated_lag = lag(verified.compensated_lag);
-  report.free_timing.contour_p999_mm = verified.compensated.extruding.contour_p999_mm;
-  report.free_timing.speed_p999 = verified.compensated_feed.p999;
-  report.free_timing.speed_max = verified.compensated_feed.max;
-  report.free_timing.speed_max_line = verified.compensated_feed.max_line;
-  report.uncompensated_flow = row(verified.uncompensated_flow);
-  report.compensated_flow = row(verified.compensated_flow);
-  if (verified.flow_difference) {
-    report.flow_difference =
-        report::FlowDifferenceRow{verified.flow_difference->relative,
-                                  verified.flow_difference->line, verified.flow_difference->p99};
-  }
   if (verified.too_much_flow && report.max_flow_mm3_s) {
     report.warnings.push_back(
         too_much_text(*verified.too_much_flow, *report.max_flow_mm3_s, report.output));
   }
   add_step_rates(verified.sliced_steps, &verified.emitted_steps, report.step_rates);
   warn_of_sliced_steps(verified.sliced_step_breaches, report.input, report.warnings);
-  report.runs_compensated = verified.runs;
+  report.runs.compensated = verified.runs;
   report.violation_count = verified.violation_count;
   for (const verify::Violation& violation : verified.violations) {
     report.violations.push_back(

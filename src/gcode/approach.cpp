@@ -54,7 +54,7 @@ bool is_plain_travel(const Command& command) {
 // The printer's own input shaper leaves no swing.
 bool Interpreter::swings() const {
   constexpr double kLeast_s = 5e-3;
-  return swinging_s_ > kLeast_s && !state_.input_shaper().is_on();
+  return swinging_s_ > kLeast_s && !state_.shaper.is_on();
 }
 
 std::optional<std::string> Interpreter::approach(const Line& line) const {

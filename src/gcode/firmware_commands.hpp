@@ -22,19 +22,19 @@ enum class Effect {
   return command.arguments.find("action:") != std::string_view::npos;
 }
 
-// What an extended command of Klipper does. `name` is in upper case.
+// The effect of an extended command of Klipper. `name` is in upper case.
 [[nodiscard]] Effect extended_effect(std::string_view name);
 
-// What an M-code without a handler of its own does.
+// The effect of an M-code without a handler of its own.
 [[nodiscard]] Effect klipper_m_code_effect(int number);
 [[nodiscard]] Effect marlin_m_code_effect(int number);
 [[nodiscard]] Effect rrf_m_code_effect(int number);
 // Whether RepRapFirmware carries the line out only when no move waits in front of its queue.
 [[nodiscard]] bool rrf_waits_for_buffer(const Command& command);
-// What an M-code does that all three firmwares answer with "Unknown command".
+// The effect of an M-code that all three firmwares answer with "Unknown command".
 [[nodiscard]] Effect foreign_m_code_effect(int number);
 
-// What a code with a part behind the point (M201.2) does to Klipper.
+// The effect on Klipper of a code with a part behind the point (M201.2).
 [[nodiscard]] Effect klipper_subcode_effect(int number);
 
 // Looks a key up in two sorted lists.

@@ -1,4 +1,4 @@
-// What each firmware does with lines, as a table of functions. The tables are in src/firmware.
+// A table of functions for each firmware, which read its lines. The tables are in src/firmware.
 #pragma once
 
 #include <optional>
@@ -15,7 +15,7 @@ namespace unflex::gcode {
 struct FirmwareReader {
   // Fills the event of the line, which has been parsed.
   void (Interpreter::*read)(Event& event, std::string_view content);
-  // What an M-code without a handler of its own does.
+  // The effect of an M-code without a handler of its own.
   Effect (*m_code_effect)(int number);
   // The pieces that an arc becomes. The options tell how fine they are.
   ArcPieces (*plan_arc)(const Arc& arc, double feed_mm_s, const Command& command,

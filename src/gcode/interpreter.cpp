@@ -21,7 +21,7 @@ namespace {
 
 constexpr std::array<char, 4> kLetters = {'X', 'Y', 'Z', 'E'};
 constexpr double kMmPerInch = 25.4;
-// An event keeps room for so many segments from line to line.
+// An event keeps room for this many segments from line to line.
 constexpr std::size_t kKeptSegments = 4;
 
 bool is_motion(const Command& command) {
@@ -53,8 +53,8 @@ double ModalState::filament_factor() const {
 }
 
 Interpreter::Interpreter(InterpreterOptions options) : options_(std::move(options)) {
-  state_.shaper_freq_hz = options_.shaper_freq_hz;
-  state_.shaper_unknown = options_.shaper_unknown;
+  state_.shaper.freq_hz = options_.shaper_freq_hz;
+  state_.shaper.unknown = options_.shaper_unknown;
   state_.filament_diameter_mm = options_.filament_diameter_mm;
   state_.absolute_e = !options_.relative_e;
   if (options_.begins_advanced) {
@@ -65,9 +65,9 @@ Interpreter::Interpreter(InterpreterOptions options) : options_(std::move(option
   state_.feed_mm_s = spec.reading.first_feed_mm_s;
   if (spec.filters.shapes_both_axes_alike) {
     const bool shapes = options_.shaper_freq_hz.x > 0.0;
-    state_.shaper.kept_freq_hz =
+    state_.shaper.settings.kept_freq_hz =
         shapes ? std::optional<double>(options_.shaper_freq_hz.x) : std::nullopt;
-    state_.shaper.type = on_all_axes<std::string>(shapes ? options_.shaper_type : "none");
+    state_.shaper.settings.type = on_all_axes<std::string>(shapes ? options_.shaper_type : "none");
   }
 }
 
@@ -225,8 +225,8 @@ void Interpreter::select_tool(Event& event, int tool) {
   } else if (from_another) {
     set_flow_factor(1.0);
   }
-  state_.retracted = false;
-  state_.hop_mm = 0.0;
+  state_.retraction.retracted = false;
+  state_.retraction.hop_mm = 0.0;
   lose_position(event);
   tool_ = tool;
 }
@@ -300,7 +300,7 @@ void Interpreter::steps_per_mm(Event& event) {
 
 void Interpreter::note_shaper(Event& event) {
   event.sets_shaper = true;
-  event.shaper.edit() = state_.input_shaper();
+  event.shaper.edit() = state_.shaper;
 }
 
 }  // namespace unflex::gcode

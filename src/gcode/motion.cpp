@@ -53,7 +53,7 @@ std::optional<Axis> axis_of(char letter) {
   }
 }
 
-// What is wrong with a speed that is not above zero. Klipper refuses the line (gcode_move.py,
+// Names the problem of a speed that is not above zero. Klipper refuses the line (gcode_move.py,
 // cmd_G1), RepRapFirmware goes on at its minimum speed. Marlin does not mind.
 const char* problem_of_feed(double feed, Firmware firmware) {
   return feed > 0.0 ? nullptr : spec_of(firmware).reading.bad_feed;
@@ -190,6 +190,18 @@ std::optional<std::array<double, 2>> centre_offset(const Command& command, const
   return offset;
 }
 
+// Why the firmware refuses an arc of this kind; nullptr if it does not.
+const char* refusal_of_arc(const FirmwareReading& reading, const Command& command,
+                           const ModalState& state) {
+  if (reading.refuses_relative_arcs && !state.absolute_xyz) {
+    return "an arc in relative mode (G91), which Klipper refuses";
+  }
+  if (reading.refuses_relative_arcs && command.has('R')) {
+    return "an arc with R, which Klipper refuses";
+  }
+  return nullptr;
+}
+
 // RepRapFirmware abandons the print if the radius is too small by more than 1 %.
 bool radius_reaches(const Command& command, double unit_mm, const Arc& arc) {
   const double radius_mm = command.value('R').value_or(0.0) * unit_mm;
@@ -197,6 +209,43 @@ bool radius_reaches(const Command& command, double unit_mm, const Arc& arc) {
       0.5 * math::hypot(arc.end_mm[0] - arc.start_mm[0], arc.end_mm[1] - arc.start_mm[1]);
   constexpr double kMissingShare = 0.02;
   return radius_mm * radius_mm * (1.0 + kMissingShare) >= half_chord_mm * half_chord_mm;
+}
+
+// The arc that a line draws in its plane, or why it draws none.
+struct DrawnArc {
+  Arc arc;
+  const char* problem = nullptr;
+};
+
+DrawnArc drawn_arc(const Command& command, const ModalState& state, const Position& end_mm,
+                   const ArcPlane& plane, const FirmwareReading& reading, bool clockwise) {
+  DrawnArc drawn;
+  Arc& arc = drawn.arc;
+  arc.start_mm = in_plane(state.position_mm, plane);
+  arc.end_mm = in_plane(end_mm, plane);
+  arc.clockwise = clockwise;
+  const auto offset = centre_offset(command, plane, state.unit_mm, arc);
+  if (!offset) {
+    drawn.problem = "an arc without a centre";
+  } else if (reading.refuses_short_radius && command.has('R') &&
+             !radius_reaches(command, state.unit_mm, arc)) {
+    drawn.problem = "an arc whose radius is too small to reach its end";
+  } else {
+    arc.centre_offset_mm = *offset;
+  }
+  return drawn;
+}
+
+// Where a piece of an arc ends that is not the last one.
+Position end_of_piece(const ArcPiece& piece, const ArcPlane& plane, const Position& arc_start_mm,
+                      const Position& arc_end_mm) {
+  Position end_mm = arc_end_mm;
+  for (const Axis axis : {plane.normal, E}) {
+    end_mm[axis] = arc_start_mm[axis] + (arc_end_mm[axis] - arc_start_mm[axis]) * piece.share;
+  }
+  end_mm[plane.alpha] = piece.end_mm[0];
+  end_mm[plane.beta] = piece.end_mm[1];
+  return end_mm;
 }
 
 // How far the end is from the circle on which the arc starts.
@@ -207,9 +256,19 @@ double gap_at_end_mm(const Arc& arc) {
                   math::hypot(arc.centre_offset_mm[0], arc.centre_offset_mm[1]));
 }
 
-// What E reads at both ends of the segment, in the firmware's single precision.
+void warn_of_gap(Event& event, const Arc& arc) {
+  if (const double gap_mm = gap_at_end_mm(arc); gap_mm > kLargestGap_mm) {
+    event.warnings.push_back(
+        fmt::format("the arc's end is {:.2f} mm off its circle: the printer goes there straight; "
+                    "check the line",
+                    gap_mm));
+  }
+}
+
+// Computes the readings of E at both ends of the segment, in the firmware's single precision.
 ReadingOfE follow_reading_of_e(const Segment& segment, ModalState& state) {
-  // Sums in single precision drift from ours. What differs by more has been set (G10, G11, tools).
+  // Sums in single precision drift from ours. A reading that differs by more has been set (G10,
+  // G11, tools).
   constexpr double kDrift_mm = 1e-3;
   constexpr double kDriftShare = 1e-5;
   const auto reading = [&](const Position& position) {
@@ -229,7 +288,7 @@ ReadingOfE follow_reading_of_e(const Segment& segment, ModalState& state) {
   return result;
 }
 
-// What is told of a move that has too much filament.
+// The warning for a move that has too much filament.
 std::string too_much_filament(const Segment& segment, Firmware firmware) {
   return fmt::format(
       "{:.4g} mm of filament in {:.4g} mm of path: {}; passed through unchanged, check the line",
@@ -300,11 +359,8 @@ void Interpreter::linear_move(Event& event) {
 
 void Interpreter::arc_move(Event& event, bool clockwise) {
   const FirmwareReading& reading = spec_of(options_.firmware).reading;
-  if (reading.refuses_relative_arcs && !state_.absolute_xyz) {
-    return not_understood(event, "an arc in relative mode (G91), which Klipper refuses");
-  }
-  if (reading.refuses_relative_arcs && command_.has('R')) {
-    return not_understood(event, "an arc with R, which Klipper refuses");
+  if (const char* const refusal = refusal_of_arc(reading, command_, state_)) {
+    return not_understood(event, refusal);
   }
   const Target target = read_target(command_, state_, options_.firmware);
   if (target.problem != nullptr) {
@@ -313,19 +369,11 @@ void Interpreter::arc_move(Event& event, bool clockwise) {
   }
   remark_oddity(event, command_, options_.firmware);
   const ArcPlane plane = arc_plane(state_.plane, options_.firmware);
-  Arc arc;
-  arc.start_mm = in_plane(state_.position_mm, plane);
-  arc.end_mm = in_plane(target.position_mm, plane);
-  arc.clockwise = clockwise;
-  const auto offset = centre_offset(command_, plane, state_.unit_mm, arc);
-  if (!offset) {
-    return not_understood(event, "an arc without a centre");
+  const auto [arc, problem] =
+      drawn_arc(command_, state_, target.position_mm, plane, reading, clockwise);
+  if (problem != nullptr) {
+    return not_understood(event, problem);
   }
-  if (reading.refuses_short_radius && command_.has('R') &&
-      !radius_reaches(command_, state_.unit_mm, arc)) {
-    return not_understood(event, "an arc whose radius is too small to reach its end");
-  }
-  arc.centre_offset_mm = *offset;
   set_feed(target.feed);
   const double feed_mm_s = state_.feed_mm_s * state_.speed_factor;
   const ArcPieces pieces =
@@ -336,12 +384,8 @@ void Interpreter::arc_move(Event& event, bool clockwise) {
   if (pieces->empty()) {
     return not_understood(event, "an arc of no angle, which Marlin leaves out");
   }
-  const bool is_in_place = state_.known[plane.alpha] && state_.known[plane.beta];
-  if (const double gap_mm = gap_at_end_mm(arc); is_in_place && gap_mm > kLargestGap_mm) {
-    event.warnings.push_back(
-        fmt::format("the arc's end is {:.2f} mm off its circle: the printer goes there straight; "
-                    "check the line",
-                    gap_mm));
+  if (state_.known[plane.alpha] && state_.known[plane.beta]) {
+    warn_of_gap(event, arc);
   }
   const bool in_xy_plane = plane.normal == Z;
   Start start;
@@ -350,19 +394,12 @@ void Interpreter::arc_move(Event& event, bool clockwise) {
       !start.known && starts_known(target, known_or_assumed(), in_xy_plane) && modes_certain();
   settle(target, state_);
   const Position start_mm = state_.position_mm;
-  const double radius_mm = math::hypot((*offset)[0], (*offset)[1]);
+  const double radius_mm = math::hypot(arc.centre_offset_mm[0], arc.centre_offset_mm[1]);
   event.segments.reserve(pieces->size());
   for (std::size_t i = 0; i < pieces->size(); ++i) {
-    const ArcPiece& piece = (*pieces)[i];
-    Position next = target.position_mm;
     const bool is_last = i + 1 == pieces->size();
-    if (!is_last) {
-      for (const Axis axis : {plane.normal, E}) {
-        next[axis] = start_mm[axis] + (target.position_mm[axis] - start_mm[axis]) * piece.share;
-      }
-      next[plane.alpha] = piece.end_mm[0];
-      next[plane.beta] = piece.end_mm[1];
-    }
+    const Position next = is_last ? target.position_mm
+                                  : end_of_piece((*pieces)[i], plane, start_mm, target.position_mm);
     append_segment(event, next, feed_mm_s, start, i == 0 || is_last ? 0.0 : radius_mm);
   }
   keep_reading_of_e(target.e_absolute, start_mm[E]);

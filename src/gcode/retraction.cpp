@@ -33,11 +33,11 @@ void Interpreter::firmware_retraction(Event& event, bool retract) {
     }
     return;
   }
-  if (state_.retracted == retract) {
+  if (state_.retraction.retracted == retract) {
     event.kind = EventKind::barrier;  // a macro may have changed the state, and then the line moves
     return;
   }
-  state_.retracted = retract;
+  state_.retraction.retracted = retract;
   const double length_mm = retract
                                ? -options_.retract_length_mm
                                : options_.retract_length_mm + options_.unretract_extra_length_mm;
@@ -59,12 +59,12 @@ void Interpreter::firmware_retraction(Event& event, bool retract) {
 // and GCodes4.cpp, doingFirmwareRetraction. Neither M220 nor M221 applies; readings stay; Z is
 // lifted after the filament is drawn back and lowered before it is pushed on.
 void Interpreter::retraction_and_hop(Event& event, bool retract) {
-  if (state_.retracted == retract) {
+  if (state_.retraction.retracted == retract) {
     // A macro may have changed the state, or the tool may be another: then the line moves.
     event.kind = EventKind::barrier;
     return;
   }
-  state_.retracted = retract;
+  state_.retraction.retracted = retract;
   Start start = start_of_retraction();
   start.known = start.known && modes_certain();
   start.assumed = start.assumed && modes_certain();
@@ -78,11 +78,11 @@ void Interpreter::retraction_and_hop(Event& event, bool retract) {
   };
   if (retract) {
     shift(E, -options_.retract_length_mm, options_.retract_speed_mm_s);
-    state_.hop_mm = options_.retract_z_hop_mm;
-    shift(Z, state_.hop_mm, kHopSpeed_mm_s);
+    state_.retraction.hop_mm = options_.retract_z_hop_mm;
+    shift(Z, state_.retraction.hop_mm, kHopSpeed_mm_s);
   } else {
-    shift(Z, -state_.hop_mm, kHopSpeed_mm_s);
-    state_.hop_mm = 0.0;
+    shift(Z, -state_.retraction.hop_mm, kHopSpeed_mm_s);
+    state_.retraction.hop_mm = 0.0;
     shift(E, options_.retract_length_mm + options_.unretract_extra_length_mm,
           options_.unretract_speed_mm_s);
   }

@@ -44,7 +44,7 @@ void Interpreter::marlin_shaper(Event& event) {
   if (ratio && *ratio >= 0.0 && *ratio <= 1.0) {
     for_each_axis(
         [&](bool is_set, std::optional<double>& value) { value = is_set ? ratio : value; },
-        is_meant, state_.shaper.damping_ratio);
+        is_meant, state_.shaper.settings.damping_ratio);
   }
   const std::optional<double> freq_hz = command_.value('F');
   if (!freq_hz || *freq_hz < 0.0) {
@@ -58,7 +58,7 @@ void Interpreter::marlin_shaper(Event& event) {
           value_hz = *freq_hz;
         }
       },
-      is_meant, state_.shaper_unknown, state_.shaper_touched, state_.shaper_freq_hz);
+      is_meant, state_.shaper.unknown, state_.shaper_touched, state_.shaper.freq_hz);
   note_shaper(event);
 }
 
@@ -72,10 +72,10 @@ void Interpreter::rrf_shaper(Event& event) {
     return;
   }
   event.kind = EventKind::barrier;
-  ShaperSettings& shaper = state_.shaper;
+  ShaperSettings& shaper = state_.shaper.settings;
   const auto freq_hz = command_.value('F');
   const auto ratio = command_.value('S');
-  const bool is_off = state_.shaper_freq_hz.x == 0.0;
+  const bool is_off = state_.shaper.freq_hz.x == 0.0;
   constexpr double kDefaultFreq_hz = 40.0;  // AxisShaper.h
   shaper.kept_freq_hz = freq_hz ? freq_hz : shaper.kept_freq_hz.value_or(kDefaultFreq_hz);
   if (ratio) {
@@ -87,8 +87,8 @@ void Interpreter::rrf_shaper(Event& event) {
     shaper.type = on_all_axes<std::string>("zvd");
   }
   shaper.custom_words = shaper.type.x == "custom" ? std::string(command_.arguments) : "";
-  state_.shaper_freq_hz = on_all_axes(shaper.type.x == "none" ? 0.0 : *shaper.kept_freq_hz);
-  state_.shaper_unknown = state_.shaper_touched = on_all_axes(false);
+  state_.shaper.freq_hz = on_all_axes(shaper.type.x == "none" ? 0.0 : *shaper.kept_freq_hz);
+  state_.shaper.unknown = state_.shaper_touched = on_all_axes(false);
   note_shaper(event);
 }
 

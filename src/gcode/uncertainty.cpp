@@ -1,4 +1,5 @@
-// What is no longer known behind lines that may do anything, or that may or may not be carried out.
+// Forgets what is no longer known behind lines that may do anything, or that may or may not be
+// carried out.
 #include <fmt/core.h>
 #include <fmt/format.h>
 
@@ -16,8 +17,8 @@ bool same_modes(const ModalState& a, const ModalState& b) {
   return a.absolute_xyz == b.absolute_xyz && a.absolute_e == b.absolute_e &&
          a.unit_mm == b.unit_mm && a.speed_factor == b.speed_factor &&
          a.filament_factor() == b.filament_factor() && a.plane == b.plane &&
-         a.retracted == b.retracted && a.inverse_time == b.inverse_time &&
-         a.shaper_freq_hz.x == b.shaper_freq_hz.x && a.shaper == b.shaper;
+         a.retraction.retracted == b.retraction.retracted && a.inverse_time == b.inverse_time &&
+         a.shaper.freq_hz.x == b.shaper.freq_hz.x && a.shaper.settings == b.shaper.settings;
 }
 
 }  // namespace

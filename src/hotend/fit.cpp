@@ -8,8 +8,8 @@
 //
 //   p = (ln τ₁, ln τ₂, θ / s),   r(p) = y − C(p) C(p)⁺ y
 //
-// on a grid first, and from its best places on by Levenberg's and Marquardt's method (Marquardt
-// 1963) with differences for the derivatives of r.
+// on a grid first, and from its best places on by Levenberg's and Marquardt's method with
+// differences for the derivatives of r.
 #include "unflex/hotend/fit.hpp"
 
 #include <Eigen/Cholesky>
@@ -20,6 +20,7 @@
 #include "fit_errors.hpp"
 #include "fit_model.hpp"
 #include "jumps.hpp"
+#include "unflex/core/levenberg_marquardt.hpp"
 #include "unflex/core/math.hpp"
 
 namespace unflex::hotend {
@@ -158,32 +159,30 @@ class Search {
   void refine(Solution& solution) const {
     constexpr int kMostSteps = 40;
     constexpr double kEnough = 1e-9;
-    double damping = 1e-3;
-    for (int step = 0; step < kMostSteps; ++step) {
+    Eigen::Matrix3d normal;
+    Eigen::Vector3d gradient;
+    const auto linearise = [&] {
       Eigen::MatrixXd slopes(data_.size(), 3);
       for (Eigen::Index j = 0; j < 3; ++j) {
         const auto [low, high] = around(solution.p, j);
         slopes.col(j) = (at(high).residual - at(low).residual) / (high[j] - low[j]);
       }
-      const Eigen::Matrix3d normal = slopes.transpose() * slopes;
-      const Eigen::Vector3d gradient = slopes.transpose() * solution.residual;
-      const double before = solution.sum;
-      bool improved = false;
-      while (damping < 1e9 && !improved) {
-        Eigen::Matrix3d damped = normal;
-        damped.diagonal() += damping * normal.diagonal().cwiseMax(1e-12);
-        const Eigen::Vector3d change = damped.ldlt().solve(-gradient).cwiseMax(-2.0).cwiseMin(2.0);
-        Solution candidate = at(within_bounds(solution.p + change));
-        improved = candidate.sum < solution.sum;
-        damping *= improved ? 0.1 : 10.0;
-        if (improved) {
-          solution = std::move(candidate);
-        }
+      normal = slopes.transpose() * slopes;
+      gradient = slopes.transpose() * solution.residual;
+    };
+    const auto attempt = [&](double lambda) -> DampedStep {
+      Eigen::Matrix3d damped = normal;
+      damped.diagonal() += lambda * normal.diagonal().cwiseMax(1e-12);
+      const Eigen::Vector3d change = damped.ldlt().solve(-gradient).cwiseMax(-2.0).cwiseMin(2.0);
+      Solution candidate = at(within_bounds(solution.p + change));
+      if (!(candidate.sum < solution.sum)) {
+        return {};
       }
-      if (!improved || before - solution.sum <= kEnough * before) {
-        return;
-      }
-    }
+      const bool enough = solution.sum - candidate.sum <= kEnough * solution.sum;
+      solution = std::move(candidate);
+      return {true, enough};
+    };
+    descend({.first = 1e-3, .down = 0.1, .up = 10.0, .most = 1e9}, kMostSteps, linearise, attempt);
   }
 
   const Log& log_;

@@ -63,11 +63,6 @@ std::string_view to_string(Rule rule) {
   return std::ranges::find(kNames, rule, &std::pair<Rule, std::string_view>::first)->second;
 }
 
-std::optional<Rule> rule_of(std::string_view word) {
-  const auto found = std::ranges::find(kNames, word, &std::pair<Rule, std::string_view>::second);
-  return found == kNames.end() ? std::nullopt : std::optional(found->first);
-}
-
 Result<Gains> gains(Rule rule, const Plant& plant) {
   if (const Status status = check(plant); !status) {
     return tl::unexpected(status.error());

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "unflex/core/levenberg_marquardt.hpp"
+
 namespace unflex::identify {
 namespace {
 
@@ -32,37 +34,36 @@ LeastSquares minimise(const Model& model, const Eigen::ArrayXd& data, const Eige
   fit.parameters = std::move(start);
   fit.residual = data - model(fit.parameters);
   fit.weighted_sum = (weights * fit.residual.square()).sum();
-  double damping = 1e-3;
-  for (int step = 0; step < kMostSteps && !fit.converged; ++step) {
+  Eigen::MatrixXd normal;
+  Eigen::VectorXd gradient;
+  const auto linearise = [&] {
     fit.jacobian = derivatives(model, fit.parameters, data.size());
     const Eigen::MatrixXd weighted = weights.matrix().asDiagonal() * fit.jacobian;
-    const Eigen::MatrixXd normal = fit.jacobian.transpose() * weighted;
-    const Eigen::VectorXd gradient = weighted.transpose() * fit.residual.matrix();
-    bool improved = false;
-    for (; damping < 1e12 && !improved && !fit.converged; damping *= improved ? 0.1 : 10.0) {
-      Eigen::MatrixXd damped = normal;
-      damped.diagonal() += damping * normal.diagonal().cwiseMax(1e-300);
-      Eigen::VectorXd change = damped.ldlt().solve(gradient);
-      const double length = change.cwiseAbs().maxCoeff();
-      fit.converged = length < kShortestStep;
-      if (!(length <= kLongestStep)) {
-        continue;
-      }
-      const Eigen::VectorXd candidate = fit.parameters + change;
-      const Eigen::ArrayXd residual = data - model(candidate);
-      const double sum = (weights * residual.square()).sum();
-      if (sum <= fit.weighted_sum) {
-        improved = true;
-        fit.converged = fit.weighted_sum - sum <= kLeastGain * fit.weighted_sum;
-        fit.parameters = candidate;
-        fit.residual = residual;
-        fit.weighted_sum = sum;
-      }
+    normal = fit.jacobian.transpose() * weighted;
+    gradient = weighted.transpose() * fit.residual.matrix();
+  };
+  const auto attempt = [&](double lambda) -> DampedStep {
+    Eigen::MatrixXd damped = normal;
+    damped.diagonal() += lambda * normal.diagonal().cwiseMax(1e-300);
+    const Eigen::VectorXd change = damped.ldlt().solve(gradient);
+    const double length = change.cwiseAbs().maxCoeff();
+    fit.converged = length < kShortestStep;
+    if (!(length <= kLongestStep)) {
+      return {false, fit.converged};
     }
-    if (!improved) {
-      break;
+    const Eigen::VectorXd candidate = fit.parameters + change;
+    const Eigen::ArrayXd residual = data - model(candidate);
+    const double sum = (weights * residual.square()).sum();
+    if (!(sum <= fit.weighted_sum)) {
+      return {false, fit.converged};
     }
-  }
+    fit.converged = fit.weighted_sum - sum <= kLeastGain * fit.weighted_sum;
+    fit.parameters = candidate;
+    fit.residual = residual;
+    fit.weighted_sum = sum;
+    return {true, fit.converged};
+  };
+  descend({.first = 1e-3, .down = 0.1, .up = 10.0, .most = 1e12}, kMostSteps, linearise, attempt);
   fit.jacobian = derivatives(model, fit.parameters, data.size());
   return fit;
 }
@@ -77,71 +78,74 @@ double prior_cost(const Prior& prior, const Eigen::VectorXd& at) {
   return (prior.precision.array() * (at - prior.centre).array().square()).sum();
 }
 
+// Takes those parameters out of the step that are on a bound and want to leave it.
+void hold_on_bounds(const Prior& prior, const Eigen::VectorXd& at, Eigen::MatrixXd& normal,
+                    Eigen::VectorXd& gradient) {
+  for (Eigen::Index i = 0; i < gradient.size(); ++i) {
+    if ((at[i] <= prior.low[i] && gradient[i] < 0.0) ||
+        (at[i] >= prior.high[i] && gradient[i] > 0.0)) {
+      normal.row(i).setZero();
+      normal.col(i).setZero();
+      normal(i, i) = 1.0;
+      gradient[i] = 0.0;
+    }
+  }
+}
+
 }  // namespace
 
 RobustFit minimise_robust(const ModelWithJacobian& model, const Eigen::ArrayXd& data, double scale,
                           const Prior& prior, Eigen::VectorXd start, int most_steps) {
   constexpr double kLongestStep = 1.0;
   constexpr double kLeastGain = 1e-7;
-  constexpr double kMostDamping = 1e9;
   RobustFit fit;
   fit.parameters = start.cwiseMax(prior.low).cwiseMin(prior.high);
   Eigen::ArrayXd values;
-  const auto weigh = [&] {
+  const auto look = [&] {
+    model(fit.parameters, values, &fit.jacobian);
     fit.weights = ((fit.residual / scale).square() + 1.0).sqrt().inverse();
   };
-  model(fit.parameters, values, &fit.jacobian);
+  model(fit.parameters, values, nullptr);
   fit.residual = data - values;
   fit.loss = soft_loss(fit.residual, scale);
   fit.cost = fit.loss + prior_cost(prior, fit.parameters);
-  weigh();
-  double damping = 1e-2;
-  bool moves = true;
-  for (int step = 0; step < most_steps && moves; ++step) {
+  Eigen::MatrixXd normal;
+  Eigen::VectorXd gradient;
+  const auto linearise = [&] {
+    look();
     const Eigen::MatrixXd weighted = fit.weights.matrix().asDiagonal() * fit.jacobian;
-    Eigen::MatrixXd normal = fit.jacobian.transpose() * weighted;
+    normal = fit.jacobian.transpose() * weighted;
     normal.diagonal() += prior.precision;
-    Eigen::VectorXd gradient =
-        weighted.transpose() * fit.residual.matrix() -
-        (prior.precision.array() * (fit.parameters - prior.centre).array()).matrix();
-    for (Eigen::Index i = 0; i < gradient.size(); ++i) {
-      if ((fit.parameters[i] <= prior.low[i] && gradient[i] < 0.0) ||
-          (fit.parameters[i] >= prior.high[i] && gradient[i] > 0.0)) {
-        normal.row(i).setZero();
-        normal.col(i).setZero();
-        normal(i, i) = 1.0;
-        gradient[i] = 0.0;
-      }
+    gradient = weighted.transpose() * fit.residual.matrix() -
+               (prior.precision.array() * (fit.parameters - prior.centre).array()).matrix();
+    hold_on_bounds(prior, fit.parameters, normal, gradient);
+  };
+  const auto attempt = [&](double lambda) -> DampedStep {
+    Eigen::MatrixXd damped = normal;
+    damped.diagonal() +=
+        lambda * normal.diagonal() + Eigen::VectorXd::Constant(gradient.size(), 1e-12);
+    const Eigen::VectorXd change = damped.ldlt().solve(gradient);
+    if (!(change.cwiseAbs().maxCoeff() <= kLongestStep)) {
+      return {};
     }
-    moves = false;
-    for (; damping < kMostDamping && !moves; damping *= moves ? 0.2 : 6.0) {
-      Eigen::MatrixXd damped = normal;
-      damped.diagonal() +=
-          damping * normal.diagonal() + Eigen::VectorXd::Constant(gradient.size(), 1e-12);
-      const Eigen::VectorXd change = damped.ldlt().solve(gradient);
-      if (!(change.cwiseAbs().maxCoeff() <= kLongestStep)) {
-        continue;
-      }
-      const Eigen::VectorXd candidate =
-          (fit.parameters + change).cwiseMax(prior.low).cwiseMin(prior.high);
-      model(candidate, values, nullptr);
-      const Eigen::ArrayXd residual = data - values;
-      const double loss = soft_loss(residual, scale);
-      const double cost = loss + prior_cost(prior, candidate);
-      if (cost < fit.cost) {
-        moves = true;
-        step = fit.cost - cost < kLeastGain * fit.cost ? most_steps : step;
-        fit.parameters = candidate;
-        fit.residual = residual;
-        fit.loss = loss;
-        fit.cost = cost;
-      }
+    const Eigen::VectorXd candidate =
+        (fit.parameters + change).cwiseMax(prior.low).cwiseMin(prior.high);
+    model(candidate, values, nullptr);
+    const Eigen::ArrayXd residual = data - values;
+    const double loss = soft_loss(residual, scale);
+    const double cost = loss + prior_cost(prior, candidate);
+    if (!(cost < fit.cost)) {
+      return {};
     }
-    if (moves) {
-      model(fit.parameters, values, &fit.jacobian);
-      weigh();
-    }
-  }
+    const bool gains = fit.cost - cost >= kLeastGain * fit.cost;
+    fit.parameters = candidate;
+    fit.residual = residual;
+    fit.loss = loss;
+    fit.cost = cost;
+    return {true, !gains};
+  };
+  descend({.first = 1e-2, .down = 0.2, .up = 6.0, .most = 1e9}, most_steps, linearise, attempt);
+  look();
   return fit;
 }
 

@@ -17,9 +17,8 @@ struct LeastSquares {
   bool converged = false;
 };
 
-// Minimises Σ w (data − model(θ))² from a start by Levenberg's and Marquardt's method (Marquardt,
-// An Algorithm for Least-Squares Estimation of Nonlinear Parameters, 1963). Derivatives are central
-// differences of 1e-5, so parameters must be of the order of 1.
+// Minimises Σ w (data − model(θ))² from a start by Levenberg's and Marquardt's method.
+// Derivatives are central differences of 1e-5, so parameters must be of the order of 1.
 [[nodiscard]] LeastSquares minimise(const Model& model, const Eigen::ArrayXd& data,
                                     const Eigen::ArrayXd& weights, Eigen::VectorXd start);
 

@@ -224,7 +224,7 @@ Result<RecordFit> fit_ringing(const std::vector<double>& samples, double rate_hz
   covariance.topLeftCorner(2, 2) = sandwich(ring->fit, weights, period).topLeftCorner(2, 2);
   RecordFit record;
   record.model = model_of(Method::ringing, {{freq_hz, damping_ratio}}, covariance);
-  // The unexplained share is that of the stretch that rings, not of the noise behind it.
+  // The unexplained share is taken over the stretch that rings, without the noise behind it.
   const double time_constant_s = 1.0 / (2.0 * std::numbers::pi * freq_hz * damping_ratio);
   const auto shown =
       std::clamp<Eigen::Index>(static_cast<Eigen::Index>(4.0 * time_constant_s * rate_hz),

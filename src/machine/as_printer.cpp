@@ -72,12 +72,12 @@ gcode::InterpreterOptions interpreter_options(const Settings& settings) {
   options.retract_z_hop_mm = settings.printer.retract_z_hop_mm;
   options.arc_resolution_mm = settings.printer.arc_resolution_mm;
   options.marlin_arcs = {
-      .min_segment_mm = settings.printer.min_arc_segment_mm,
-      .max_segment_mm = settings.printer.max_arc_segment_mm,
-      .segments_per_s = settings.printer.arc_segments_per_s,
-      .min_circle_segments = static_cast<int>(settings.printer.min_circle_segments),
-      .correction_interval = static_cast<int>(settings.printer.arc_correction_interval),
-      .circles = settings.printer.arc_p_circles};
+      .min_segment_mm = settings.printer.arcs.min_segment_mm,
+      .max_segment_mm = settings.printer.arcs.max_segment_mm,
+      .segments_per_s = settings.printer.arcs.segments_per_s,
+      .min_circle_segments = static_cast<int>(settings.printer.arcs.min_circle_segments),
+      .correction_interval = static_cast<int>(settings.printer.arcs.correction_interval),
+      .circles = settings.printer.arcs.p_circles};
   options.shaper_freq_hz = settings.shaper_freq_hz();
   options.shaper_unknown = settings.shaper_unknown();
   options.shaper_type = settings.shaper_type().x;
@@ -139,10 +139,10 @@ planner::FirmwareConfig firmware_config(const Settings& settings) {
   config.pressure_advance_smooth_s = settings.extruder.pressure_advance_smooth_s;
   config.shaper = {settings.shaper_type(), settings.shaper_damping_ratio()};
   config.steps_per_mm = settings.steps_per_mm();
-  config.classic_jerk = settings.printer.classic_jerk;
-  config.min_steps_per_segment = static_cast<int>(settings.printer.min_steps_per_segment);
-  config.jd_handle_small_segments = settings.printer.jd_handle_small_segments;
-  config.minimum_planner_speed_mm_s = settings.printer.minimum_planner_speed_mm_s;
+  config.classic_jerk = settings.printer.junctions.classic_jerk;
+  config.min_steps_per_segment = static_cast<int>(settings.printer.junctions.min_steps_per_segment);
+  config.jd_handle_small_segments = settings.printer.junctions.handle_small_segments;
+  config.minimum_planner_speed_mm_s = settings.printer.junctions.minimum_speed_mm_s;
   config.block_buffer_size = config.ring_length = static_cast<int>(settings.queue_length());
   config.step_clock_hz = settings.printer.step_clock_hz;
   config.has_print_jerk = config.rounds_phases = settings.has_print_jerk();

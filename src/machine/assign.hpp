@@ -82,8 +82,8 @@ struct Reading {
   void note(SourcePlace place, std::string message, std::vector<std::string> keys = {}) {
     notes.push_back({{std::move(place), std::move(message)}, std::move(keys)});
   }
-  // Takes the damping ratio that an input shaper is made for as that of the axis, "x" or "y". One
-  // that no printer has brings a note instead.
+  // Takes the damping ratio that an input shaper is made for as the damping ratio of the axis, "x"
+  // or "y". A ratio that no printer has brings a note instead.
   void add_shaper_damping(const std::string& axis, double ratio, const SourcePlace& place);
   void guess(SourcePlace place, std::string message) {
     guesses.push_back({std::move(place), std::move(message)});

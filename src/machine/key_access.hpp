@@ -15,9 +15,9 @@ inline constexpr Bounds kNotNegative{.min = 0.0};
 inline constexpr Bounds kPositive{.min = 0.0, .min_open = true};
 
 // Members of the settings' sections, and of the form of an axis as mass, spring and damper.
-template <auto Section, auto Field>
+template <auto... Members>
 auto& setting(Draft& draft) {
-  return draft.settings.*Section.*Field;
+  return (draft.settings.*....*Members);
 }
 
 // Axis, Index: the number in Axes.
@@ -36,9 +36,9 @@ double derived(const Settings& settings) {
   return (settings.*Derived)();
 }
 
-template <auto Section, auto Field, std::size_t Index>
+template <std::size_t Axis, auto... Members>
 auto& of_axis(Draft& draft) {
-  return (draft.settings.*Section.*Field)[Index];
+  return setting<Members...>(draft)[Axis];
 }
 
 template <auto Derived, std::size_t Index>

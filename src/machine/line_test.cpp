@@ -28,7 +28,8 @@ constexpr double kRow_mm = 2.0;
 double least_line_mm(const Settings& settings) {
   const FirmwareMotion& motion = settings.spec().motion;
   if (motion.rounds_to_steps) {
-    const double more = motion.skips_short_moves ? settings.printer.min_steps_per_segment : 0.0;
+    const double more =
+        motion.skips_short_moves ? settings.printer.junctions.min_steps_per_segment : 0.0;
     return (more + 1.0) / settings.steps_per_mm()[0];
   }
   return 1e-3;

@@ -42,7 +42,7 @@ std::string origin_text(const std::optional<SourcePlace>& place) {
   return place->line == 0 ? place->file : fmt::format("{}:{}", place->file, place->line);
 }
 
-// A key of one mode whose value is that of the largest of several.
+// Whether the key is one mode's, on an axis that has several: its value is then the largest mode's.
 bool is_of_modes(const Draft& draft, std::string_view key) {
   const auto is_of = [&](std::string_view axis, const AxisDynamics& dynamics) {
     return !dynamics.modes.empty() && key.starts_with(fmt::format("dynamics.{}.", axis)) &&

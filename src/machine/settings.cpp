@@ -383,7 +383,7 @@ double Settings::tolerance_um() const {
 }
 
 Axes<std::string> Settings::shaper_type() const {
-  Axes<std::string> type = printer.input_shaper_type;
+  Axes<std::string> type = printer.input_shaper.type;
   type.x = type.x == "auto" ? std::string(spec().filters.shaper_type) : type.x;
   type.y = type.y == "auto" ? type.x : type.y;
   return type;
@@ -394,13 +394,13 @@ Axes<double> Settings::shaper_damping_ratio() const {
       [&](const std::optional<double>& told) {
         return told.value_or(spec().filters.shaper_damping_ratio);
       },
-      printer.input_shaper_damping_ratio);
+      printer.input_shaper.damping_ratio);
 }
 
 // One shaper may be for both axes.
 Axes<double> Settings::shaper_freq_hz() const {
-  const double x_hz = printer.input_shaper_freq_hz.x.value_or(0.0);
-  return {x_hz, printer.input_shaper_freq_hz.y.value_or(
+  const double x_hz = printer.input_shaper.freq_hz.x.value_or(0.0);
+  return {x_hz, printer.input_shaper.freq_hz.y.value_or(
                     spec().filters.shapes_both_axes_alike ? x_hz : 0.0)};
 }
 
@@ -409,7 +409,7 @@ Axes<double> Settings::shaper_freq_hz() const {
 Axes<bool> Settings::shaper_unknown() const {
   Axes<bool> unknown = map_axes(
       [&](const std::optional<double>& told) { return !told && printer.variant != "snapmaker_j1"; },
-      printer.input_shaper_freq_hz);
+      printer.input_shaper.freq_hz);
   if (spec().filters.shapes_both_axes_alike) {
     unknown.y = unknown.y && unknown.x;
   }

@@ -44,14 +44,15 @@ double given(double hz) { return hz > 0.0 ? hz : kNoLimit; }
 }  // namespace
 
 StepLimits Settings::step_limits() const {
-  StepLimits most{given(printer.max_step_rate_hz), given(printer.max_total_step_rate_hz), kNoLimit};
+  StepLimits most{given(printer.board.max_step_rate_hz),
+                  given(printer.board.max_total_step_rate_hz), kNoLimit};
   for (const Driver& driver : kDrivers) {
-    if (driver.name == printer.driver) {
+    if (driver.name == printer.board.driver) {
       most.max_hz = std::min(most.max_hz, driver.max_hz);
     }
   }
   for (const Board& board : kBoards) {
-    if (board.name == printer.mcu) {
+    if (board.name == printer.board.mcu) {
       most.max_hz = std::min(most.max_hz, board.one_hz);
       most.max_shared_hz = board.three_hz;
     }

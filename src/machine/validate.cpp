@@ -200,9 +200,9 @@ Status check_printer(const Draft& draft) {
                     "limits.max_z_accel_mm_s2 must not exceed limits.max_accel_mm_s2");
   }
   for (const auto& [key, value] :
-       {std::pair{"printer.min_steps_per_segment", s.printer.min_steps_per_segment},
-        std::pair{"printer.min_circle_segments", s.printer.min_circle_segments},
-        std::pair{"printer.arc_correction_interval", s.printer.arc_correction_interval},
+       {std::pair{"printer.min_steps_per_segment", s.printer.junctions.min_steps_per_segment},
+        std::pair{"printer.min_circle_segments", s.printer.arcs.min_circle_segments},
+        std::pair{"printer.arc_correction_interval", s.printer.arcs.correction_interval},
         std::pair{"printer.queue_length", s.queue_length()},
         std::pair{"limits.jerk_policy", s.limits.jerk_policy}}) {
     if (value != std::floor(value)) {
@@ -210,11 +210,11 @@ Status check_printer(const Draft& draft) {
                       fmt::format("{} is {}, but must be a whole number", key, value));
     }
   }
-  if (s.printer.min_arc_segment_mm > s.printer.max_arc_segment_mm) {
+  if (s.printer.arcs.min_segment_mm > s.printer.arcs.max_segment_mm) {
     return conflict(draft, {"printer.min_arc_segment_mm", "printer.max_arc_segment_mm"},
                     fmt::format("printer.min_arc_segment_mm is {}, but must not exceed "
                                 "printer.max_arc_segment_mm, {}",
-                                s.printer.min_arc_segment_mm, s.printer.max_arc_segment_mm));
+                                s.printer.arcs.min_segment_mm, s.printer.arcs.max_segment_mm));
   }
   const double least_extra_mm = s.spec().defaults.unretracts_less ? -s.retract_length_mm() : 0.0;
   if (s.printer.unretract_extra_length_mm < least_extra_mm) {

@@ -5,7 +5,7 @@
 
 namespace unflex::machine {
 
-// With so many nodes per period of resonance, more would gain little.
+// Nodes per period of resonance beyond which more would gain little.
 inline constexpr double kGoodNodesPerPeriod = 20.0;
 
 // Turns mass, stiffness and damping into frequency and damping ratio.

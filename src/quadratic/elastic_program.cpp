@@ -15,10 +15,10 @@ constexpr double kFirstMultiplier = 1.0;
 constexpr double kFirstBreach = 0.1;
 // The share of the way to the nearest bound that a step goes.
 constexpr double kOfTheWay = 0.99;
-// What a fixed unknown weighs.
+// Weight on the diagonal that holds a fixed unknown.
 constexpr double kFixed = 1e12;
 constexpr double kStationary = 1e-2;
-// What a row that is less stiff adds to the matrix does not matter.
+// A row that is less stiff is left out of the matrix, where it would not matter.
 constexpr double kStiff = 1e-6;
 
 #define UNFLEX_INLINE [[gnu::always_inline]] inline
@@ -58,6 +58,18 @@ UNFLEX_INLINE void add_squares_to(const double* const* rows, const double* f,
     const double of_d = f[3] * d[i];
     for (int j = i / kLanes * kLanes; j < W; ++j) {
       block[i * W + j] += (of_a * a[j] + of_b * b[j]) + (of_c * c[j] + of_d * d[j]);
+    }
+  }
+}
+
+// columns += block, from the diagonal down. A column of the band holds its W rows one after the
+// other.
+template <int W>
+UNFLEX_INLINE void add_to_band(const Block<W>& block, double* columns) {
+  for (int i = 0; i < W; ++i) {
+    double* const column = columns + i * W;
+    for (int j = i; j < W; ++j) {
+      column[j - i] += block[i * W + j];
     }
   }
 }
@@ -213,7 +225,7 @@ void ElasticProgram<W>::start() {
 }
 
 template <int W>
-double ElasticProgram<W>::linearise() {
+void ElasticProgram<W>::start_lagrangian() {
   lagrangian_ = linear_;
   for (std::size_t i = 0; i < size_; ++i) {
     const double* const column = &hessian_[i * W];
@@ -226,51 +238,59 @@ double ElasticProgram<W>::linearise() {
     }
     lagrangian_[i] += sum;
   }
+}
+
+template <int W>
+typename ElasticProgram<W>::RowWeight ElasticProgram<W>::weigh(std::size_t row, std::size_t& side) {
+  RowWeight weight;
+  for (; side < sides_.size() && sides_[side].row == row; ++side) {
+    Side& own = sides_[side];
+    own.stiffness = 1.0 / (own.room / own.multiplier + own.breach / own.slack);
+    weight.stiffness += own.stiffness;
+    weight.multiplier += own.sign * own.multiplier;
+    weight.force += own.sign * own.stiffness * (own.breach - own.room);
+  }
+  return weight;
+}
+
+template <int W>
+std::size_t ElasticProgram<W>::add_rows_at(std::size_t row, std::size_t& side) {
+  const std::size_t first = first_[row];
+  Block<W> block{};
+  const double* stiff_rows[4];
+  double stiffnesses[4];
+  int stiff = 0;
+  for (; row < first_.size() && first_[row] == first; ++row) {
+    const RowWeight weight = weigh(row, side);
+    const Gradient& g = gradients_[row];
+    add_to(Width<W>{}, g.data(), weight.multiplier, lagrangian_.data() + first);
+    add_to(Width<W>{}, g.data(), -weight.force, step_.data() + first);
+    if (weight.stiffness > kStiff) {
+      stiff_rows[stiff] = g.data();
+      stiffnesses[stiff++] = weight.stiffness;
+      if (stiff == 4) {
+        add_squares_to(Width<W>{}, stiff_rows, stiffnesses, block.data());
+        stiff = 0;
+      }
+    }
+  }
+  for (int i = 0; i < stiff; ++i) {
+    add_square_to(Width<W>{}, stiff_rows[i], stiffnesses[i], block.data());
+  }
+  add_to_band<W>(block, &factor_[first * W]);
+  return row;
+}
+
+template <int W>
+double ElasticProgram<W>::linearise() {
+  start_lagrangian();
   // Columns beyond the last one keep the loops of factor() even.
   factor_.assign((size_ + W) * W, 0.0);
   std::copy(hessian_.begin(), hessian_.end(), factor_.begin());
   step_.assign(size_, 0.0);
-  // Rows whose unknowns begin at the same place stand together, and so does their sum.
-  Block<W> block{};
   std::size_t side = 0;
   for (std::size_t row = 0; row < first_.size();) {
-    const std::size_t first = first_[row];
-    block = {};
-    const double* stiff_rows[4];
-    double stiffnesses[4];
-    int stiff = 0;
-    for (; row < first_.size() && first_[row] == first; ++row) {
-      double stiffness = 0.0;
-      double multiplier = 0.0;
-      double force = 0.0;
-      for (; side < sides_.size() && sides_[side].row == row; ++side) {
-        Side& own = sides_[side];
-        own.stiffness = 1.0 / (own.room / own.multiplier + own.breach / own.slack);
-        stiffness += own.stiffness;
-        multiplier += own.sign * own.multiplier;
-        force += own.sign * own.stiffness * (own.breach - own.room);
-      }
-      const Gradient& g = gradients_[row];
-      add_to(Width<W>{}, g.data(), multiplier, lagrangian_.data() + first);
-      add_to(Width<W>{}, g.data(), -force, step_.data() + first);
-      if (stiffness > kStiff) {
-        stiff_rows[stiff] = g.data();
-        stiffnesses[stiff++] = stiffness;
-        if (stiff == 4) {
-          add_squares_to(Width<W>{}, stiff_rows, stiffnesses, block.data());
-          stiff = 0;
-        }
-      }
-    }
-    for (int i = 0; i < stiff; ++i) {
-      add_square_to(Width<W>{}, stiff_rows[i], stiffnesses[i], block.data());
-    }
-    for (int i = 0; i < W; ++i) {
-      double* const column = &factor_[(first + i) * W];
-      for (int j = i; j < W; ++j) {
-        column[j - i] += block[i * W + j];
-      }
-    }
+    row = add_rows_at(row, side);
   }
   hold_fixed(lagrangian_);
   for (const std::size_t i : fixed_) {

@@ -12,9 +12,9 @@ namespace {
 
 // Deviations are kept for bits of the path of about this long.
 constexpr double kChunk_s = 3e-3;
-// One candidate for the worst places is taken per so much time.
+// One candidate for the worst places is taken in each block of this length.
 constexpr double kBlock_s = 0.1;
-// So many periods of the slower axis are shown before and after a place.
+// How many periods of the slower axis are shown before and after a place.
 constexpr double kPeriods = 3.0;
 constexpr double kShortest_s = 0.06;
 constexpr double kLongest_s = 0.2;

@@ -51,19 +51,20 @@ report::Recording Recorder::finish(const verify::VerifyReport& verified) {
     }
     return in_order(spread(main), others);
   };
-  report::Contender played{
-      "as sliced",
-      spreads(verified.uncompensated, [](const auto& other) { return other.uncompensated; }), true,
-      rms_of(verified.uncompensated_corners)};
-  const bool has_unshaped = verified.unshaped && gatherer_->asks_for_unshaped();
+  report::Contender played{"as sliced",
+                           spreads(verified.measured.uncompensated,
+                                   [](const auto& other) { return other.uncompensated; }),
+                           true, rms_of(verified.measured.uncompensated.corners)};
+  const bool has_unshaped = verified.measured.unshaped && gatherer_->asks_for_unshaped();
   std::vector<report::Contender> contenders = {
       has_unshaped ? report::Contender{"as sliced",
-                                       spreads(*verified.unshaped,
+                                       spreads(*verified.measured.unshaped,
                                                [](const auto& other) { return *other.unshaped; }),
                                        true, std::nullopt}
                    : played,
-      {"unflex", spreads(verified.compensated, [](const auto& other) { return other.compensated; }),
-       true, rms_of(verified.compensated_corners)}};
+      {"unflex",
+       spreads(verified.measured.compensated, [](const auto& other) { return other.compensated; }),
+       true, rms_of(verified.measured.compensated.corners)}};
   for (report::Contender& shaper : recording.contenders) {
     if (!shaper.spreads.empty()) {
       shaper.spreads =

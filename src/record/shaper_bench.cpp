@@ -11,13 +11,13 @@ namespace {
 // Moments per period of the faster axis.
 constexpr double kPerPeriod = 16.0;
 constexpr double kBlock_s = 1.0;
-// After so much measured time every second block is left out, after as much again every second of
-// the rest, and so on.
+// After this much measured time every second block is left out. After the same time again every
+// second one of the rest is left out, and so on.
 constexpr double kStrideLasts_s = 60.0;
-// After so many skipped moments the nozzles are asked once, so that they forget the past.
+// How many moments are skipped before the nozzles are asked once, so that they forget the past.
 constexpr std::size_t kSkipped = 128;
-// A nozzle without a new state for so many intervals has stood still, or moved steadily: then it is
-// this near to where its velocity has led it.
+// A nozzle without a new state for kGap intervals has stood still or moved steadily. If it moved
+// steadily, it is within kSteady_mm of where its velocity has led it.
 constexpr double kGap = 4.0;
 constexpr double kSteady_mm = 1e-4;
 // At a corner the deviation peaks in a kink. So if its square exceeds kNearPeak times the largest

@@ -24,7 +24,7 @@ const Contender* contender(const Report& report, std::string_view name) {
 }
 
 std::string now_text(const Report& report) {
-  if (report.unshaped) {
+  if (report.measured.unshaped) {
     return report.facts.shaper.empty()
                ? "under the input shaper that the print sets"
                : fmt::format("under the printer's own input shaper, {}", report.facts.shaper);
@@ -39,9 +39,10 @@ std::optional<Place> first(const std::vector<Place>& places) {
 
 std::string motors_text(const Report& report, double times_own_accel) {
   const PrinterFacts& facts = report.facts;
-  std::string text = fmt::format("Motors are asked for at most {:.0f} mm/s and {:.0f} mm/s²",
-                                 report.base_max_velocity_mm_s, report.base_max_accel_mm_s2);
-  const bool fast = report.base_max_velocity_mm_s > facts.motor_max_velocity_mm_s;
+  std::string text =
+      fmt::format("Motors are asked for at most {:.0f} mm/s and {:.0f} mm/s²",
+                  report.measured.base.max_velocity_mm_s, report.measured.base.max_accel_mm_s2);
+  const bool fast = report.measured.base.max_velocity_mm_s > facts.motor_max_velocity_mm_s;
   const std::string own_accel =
       fmt::format("{:.0f} mm/s² ({})", facts.motor_max_accel_mm_s2, facts.motor_max_accel_origin);
   if (times_own_accel > 1.0) {
@@ -78,7 +79,7 @@ double times_smaller(const Comparison& comparison) {
 double Better::times() const { return times_smaller(exact); }
 
 Better better(const Report& report) {
-  const bool shaped = report.unshaped.has_value();
+  const bool shaped = report.measured.unshaped.has_value();
   const Contender* const zv = shaped ? nullptr : contender(report, "ZV");
   const auto zv_where = [&](const auto& counts) {
     std::optional<double> most;
@@ -91,12 +92,12 @@ Better better(const Report& report) {
   };
   Better result;
   result.now = now_text(report);
-  result.exact = {report.uncompensated.extruding.contour_rms_mm,
-                  report.compensated.extruding.contour_rms_mm,
+  result.exact = {report.measured.uncompensated.extruding.contour_rms_mm,
+                  report.measured.compensated.extruding.contour_rms_mm,
                   zv_where([](double error) { return error == 0.0; })};
-  if (report.laid_line) {
-    result.edge = {report.laid_line->uncompensated.edge.rms_mm,
-                   report.laid_line->compensated.edge.rms_mm, std::nullopt};
+  if (report.measured.uncompensated.line.is_known()) {
+    result.edge = {report.measured.uncompensated.line.edge.rms_mm,
+                   report.measured.compensated.line.edge.rms_mm, std::nullopt};
   }
   for (const Sensitivity& one : report.sensitivity) {
     if (is_off(one.frequency_error)) {
@@ -112,30 +113,31 @@ Better better(const Report& report) {
 }
 
 std::vector<std::string> faster_texts(const Report& report) {
-  if (report.free_timing.tolerance_mm <= 0.0 || report.reference_time_s <= 0.0) {
+  if (report.free_timing.tolerance_mm <= 0.0 || report.measured.uncompensated.time_s <= 0.0) {
     return {};
   }
-  const double change = 1.0 - report.emitted_time_s / report.reference_time_s;
+  const double change =
+      1.0 - report.measured.compensated.time_s / report.measured.uncompensated.time_s;
   std::vector<std::string> lines = {
       fmt::format("{} → {} to print, {:.0f} % {}; the nozzle may stray {:.4g} µm and {}",
-                  duration_text(report.reference_time_s), duration_text(report.emitted_time_s),
-                  100.0 * std::abs(change), change >= 0.0 ? "less" : "more",
-                  report.free_timing.tolerance_mm * 1e3,
-                  report.free_timing.is_kept() ? "keeps to it" : "strays further in places")};
+                  duration_text(report.measured.uncompensated.time_s),
+                  duration_text(report.measured.compensated.time_s), 100.0 * std::abs(change),
+                  change >= 0.0 ? "less" : "more", report.free_timing.tolerance_mm * 1e3,
+                  keeps_tolerance(report) ? "keeps to it" : "strays further in places")};
   constexpr double kWorthIt = 0.02;  // of the print time
   if (const std::optional<NarrowerBand>& narrower = report.free_timing.narrower;
-      narrower && narrower->saves_s > kWorthIt * report.emitted_time_s) {
-    lines.push_back(
-        fmt::format("Frequencies known to {0:.3g} % would save some {1:.0f} % more: "
-                    "dynamics.freq_error = {2:.3g}",
-                    100.0 * narrower->freq_error, 100.0 * narrower->saves_s / report.emitted_time_s,
-                    narrower->freq_error));
+      narrower && narrower->saves_s > kWorthIt * report.measured.compensated.time_s) {
+    lines.push_back(fmt::format(
+        "Frequencies known to {0:.3g} % would save some {1:.0f} % more: "
+        "dynamics.freq_error = {2:.3g}",
+        100.0 * narrower->freq_error,
+        100.0 * narrower->saves_s / report.measured.compensated.time_s, narrower->freq_error));
   }
   return lines;
 }
 
 std::optional<std::string> hardly_worth_it(const Report& report) {
-  const double strays_mm = report.uncompensated.extruding.contour_p99_mm;
+  const double strays_mm = report.measured.uncompensated.extruding.contour_p99_mm;
   if (report.free_timing.tolerance_mm > 0.0 || strays_mm >= kSeen_mm) {
     return std::nullopt;
   }
@@ -145,12 +147,12 @@ std::optional<std::string> hardly_worth_it(const Report& report) {
 }
 
 std::string width_text(const Report& report) {
-  if (!report.laid_line) {
+  if (!report.measured.uncompensated.line.is_known()) {
     return "How wide the line comes out is not known: give pressure.advance_s, the pressure "
            "advance that the hotend needs; unflex tune --pressure finds it by printing";
   }
-  const WidthRow& before = report.laid_line->uncompensated.width;
-  const WidthRow& after = report.laid_line->compensated.width;
+  const verify::WidthStats& before = report.measured.uncompensated.line.width;
+  const verify::WidthStats& after = report.measured.compensated.line.width;
   const auto written = std::ranges::find(report.printer, "pressure.written", &Setting::key);
   const bool may_be =
       written != report.printer.end() ? written->value == "false" : report.firmware != "klipper";
@@ -204,23 +206,24 @@ Safe safe(const Report& report) {
                                          report.violation_count == 1 ? "rule is" : "rules are",
                                          report.violations.empty() ? "" : report.violations[0]));
   }
-  if (report.base_max_accel_mm_s2 > 0.0) {
-    result.times_own_accel = facts.motor_max_accel_mm_s2 > 0.0
-                                 ? report.base_max_accel_mm_s2 / facts.motor_max_accel_mm_s2
-                                 : 0.0;
+  if (report.measured.base.max_accel_mm_s2 > 0.0) {
+    result.times_own_accel =
+        facts.motor_max_accel_mm_s2 > 0.0
+            ? report.measured.base.max_accel_mm_s2 / facts.motor_max_accel_mm_s2
+            : 0.0;
     result.reasons.push_back(motors_text(report, result.times_own_accel));
     result.reasons.push_back(
         fmt::format("Their speed changes by at most {:.1f} mm/s from line to line.",
-                    report.base_max_step_mm_s));
+                    report.measured.base.max_step_mm_s));
   }
   result.reasons.push_back(
       facts.travel.empty()
           ? "The printer's travel is not known and not checked: give printer.travel_x_mm and _y_mm."
           : fmt::format("The travel was checked: {}.", facts.travel));
   result.reasons.push_back(fmt::format("At most {:.0f} lines come in a second; {} takes {:.0f}.",
-                                       report.max_lines_per_s, facts.lines_source,
+                                       report.measured.output.max_lines_per_s, facts.lines_source,
                                        facts.max_lines_per_s));
-  if (!report.solver_engine.empty() && report.extruded_path.total_mm > 0.0) {
+  if (!report.solver.engine.empty() && report.extruded_path.total_mm > 0.0) {
     result.reasons.push_back(kept_text(report));
   }
   return result;

@@ -9,6 +9,7 @@
 
 #include "answers.hpp"
 #include "assets.hpp"
+#include "facts.hpp"
 #include "temperature_card.hpp"
 #include "unflex/core/base64.hpp"
 #include "unflex/report/format.hpp"
@@ -17,10 +18,6 @@
 
 namespace unflex::report {
 namespace {
-
-// Limits for lists and texts that may be of any length.
-constexpr std::size_t kMostListed = 100;
-constexpr std::size_t kLongestText = 500;
 
 double um(double mm) { return std::round(mm * 1e6) / 1000.0; }
 double rounded(double value, double unit) { return std::round(value / unit) * unit; }
@@ -31,7 +28,7 @@ Json change_json(const BeforeAfter& change) {
   return {spread_json(change.before), spread_json(change.after)};
 }
 
-Json row_json(const DeviationRow& row) {
+Json row_json(const verify::DeviationStats& row) {
   return {{"max", um(row.contour_max_mm)},
           {"p99", um(row.contour_p99_mm)},
           {"rms", um(row.contour_rms_mm)},
@@ -131,7 +128,7 @@ Json listed(const std::vector<std::string>& texts) {
 
 Json remarks_json(const Report& r) {
   Json fallbacks = Json::array();
-  for (const Fallback& kept : r.fallbacks) {
+  for (const Fallback& kept : r.runs.fallbacks) {
     if (fallbacks.size() < kMostListed) {
       fallbacks.push_back({kept.first_line, kept.last_line, kept.reason});
     }
@@ -141,115 +138,8 @@ Json remarks_json(const Report& r) {
           {"warnings", listed(r.warnings)},
           {"warning_count", r.warnings.size()},
           {"fallbacks", fallbacks},
-          {"fallback_count", r.runs_fallback},
+          {"fallback_count", r.runs.fallback},
           {"kept_moves", Json(r.kept_moves)}};
-}
-
-Json facts_json(const Report& r) {
-  Json facts = Json::array();
-  const auto add = [&](std::string name, std::string value) {
-    facts.push_back({std::move(name), std::move(value)});
-  };
-  add("Sliced file", r.input);
-  add("Compensated file", r.output);
-  add("Firmware", r.firmware);
-  add("Print time", fmt::format("{} as sliced, {} compensated", duration_text(r.reference_time_s),
-                                duration_text(r.emitted_time_s)));
-  if (!r.solver_engine.empty()) {
-    add("Stretches of motion", fmt::format("{} of {} compensated, {} stay as sliced",
-                                           r.runs_compensated, r.runs_total, r.runs_fallback));
-    add("Extruded path",
-        fmt::format("{} of {:.0f} mm compensated", share_text(r.extruded_path.compensated_share()),
-                    r.extruded_path.total_mm));
-    add("Solver", fmt::format("{}, {} parts, {} iterations", r.solver_engine, r.windows_total,
-                              r.solver_iterations));
-  }
-  for (std::size_t i = 0; i < std::min(r.unknown_commands.size(), kMostListed); ++i) {
-    const UnknownCommand& unknown = r.unknown_commands[i];
-    add("Unknown command",
-        fmt::format("{}, {}×, first in line {}: {} moves behind it stay as they are",
-                    unknown.command.substr(0, kLongestText), unknown.count, unknown.first_line,
-                    unknown.moves_kept));
-  }
-  if (!r.plants.empty()) {
-    add("If the axes are as one of the plants",
-        fmt::format("{} µm RMS", range_text(r.plants, &PlantDeviation::compensated)));
-  }
-  if (r.robustness) {
-    add("Suits several models", fmt::format("{} µm RMS as optimised, {} for the nominal alone",
-                                            micrometres_text(r.robustness->rms_mm),
-                                            micrometres_text(r.robustness->nominal_rms_mm)));
-  }
-  if (r.unshaped) {
-    add("Without the printer's own shaper",
-        fmt::format("{} µm RMS and {} µm at most before",
-                    micrometres_text(r.unshaped->extruding.contour_rms_mm),
-                    micrometres_text(r.unshaped->extruding.contour_max_mm)));
-  }
-  const CornerRow& corners = r.uncompensated_corners;
-  const CornerRow& left = r.compensated_corners;
-  if (corners.count > 0) {
-    add(fmt::format("Distance from {} corners", corners.count),
-        fmt::format("{} → {} µm RMS, 99 % within {} → {} µm, {} → {} µm at most, as sliced in line "
-                    "{}, compensated in line {}",
-                    micrometres_text(corners.rms_mm), micrometres_text(left.rms_mm),
-                    micrometres_text(corners.p99_mm), micrometres_text(left.p99_mm),
-                    micrometres_text(corners.max_mm), micrometres_text(left.max_mm),
-                    corners.max_line, left.max_line));
-  }
-  add("Output", fmt::format("{} lines, {:.1f} MB, at most {:.0f} lines/s", r.output_lines,
-                            static_cast<double>(r.output_bytes) * 1e-6, r.max_lines_per_s));
-  add("Filament",
-      fmt::format("{:.2f} mm in, {:.2f} mm out", r.input_extrusion_mm, r.output_extrusion_mm));
-  if (r.fitted_filament) {
-    const Report::FittedFilament& fitted = *r.fitted_filament;
-    add("Filament fitted before",
-        fmt::format("{:.2f} mm of moves that print became {:.2f} mm, E × {:.5f} to {:.5f}, {:.1f} "
-                    "mm³ of material; the print ends at {:.1f} mm of the filament",
-                    fitted.sliced_mm, fitted.fitted_mm, fitted.least_factor, fitted.most_factor,
-                    fitted.material_mm3, fitted.end_mm));
-  }
-  if (r.laid_line) {
-    const LineRow& before = r.laid_line->uncompensated;
-    const LineRow& after = r.laid_line->compensated;
-    add("Edges of the line",
-        fmt::format("{} → {} µm RMS, 99 % within {} → {} µm, {} → {} µm at most, as sliced in line "
-                    "{}, compensated in line {}",
-                    micrometres_text(before.edge.rms_mm), micrometres_text(after.edge.rms_mm),
-                    micrometres_text(before.edge.p99_mm), micrometres_text(after.edge.p99_mm),
-                    micrometres_text(before.edge.max_mm), micrometres_text(after.edge.max_mm),
-                    before.edge.line, after.edge.line));
-    add("Width of the line if the hotend is another",
-        fmt::format("{} % RMS with 20 % less pressure, {} with more; {} with 2 ms more dead time",
-                    percent_change_text(before.less_pressure.rms, after.less_pressure.rms),
-                    percent_change_text(before.more_pressure.rms, after.more_pressure.rms),
-                    percent_change_text(before.later.rms, after.later.rms)));
-  } else {
-    add("Filament laid ahead of the nozzle or behind",
-        fmt::format("{} → {} µm RMS, {} → {} µm at most",
-                    micrometres_text(r.uncompensated_lag.rms_mm),
-                    micrometres_text(r.compensated_lag.rms_mm),
-                    micrometres_text(r.uncompensated_lag.max_mm),
-                    micrometres_text(r.compensated_lag.max_mm)));
-  }
-  const FlowRow& flow = r.uncompensated_flow;
-  const FlowRow& asked = r.compensated_flow;
-  add("Flow of filament",
-      fmt::format(
-          "{:.1f} → {:.1f} mm³/s at most, as sliced in line {}, compensated in line {} of "
-          "the output; it changes by {:.0f} → {:.0f} mm³/s² at most, in lines {} and {}{}",
-          flow.max_mm3_s, asked.max_mm3_s, flow.max_line, asked.max_line, flow.max_change_mm3_s2,
-          asked.max_change_mm3_s2, flow.max_change_line, asked.max_change_line,
-          r.max_flow_mm3_s ? fmt::format("; the hotend melts {:.1f} mm³/s", *r.max_flow_mm3_s)
-                           : std::string{}));
-  if (r.flow_difference) {
-    add("Rate of filament beside the sliced file", flow_difference_text(*r.flow_difference));
-  }
-  if (!r.step_rates.motors.empty()) {
-    add("Step rates", step_rates_list(r.step_rates, /*has_output=*/true));
-  }
-  add("Written by", fmt::format("unflex {}", r.version));
-  return facts;
 }
 
 Json data_json(const Report& r) {
@@ -258,25 +148,27 @@ Json data_json(const Report& r) {
   for (const Setting& setting : r.printer) {
     settings.push_back({setting.key, setting_text(setting.value), setting.origin});
   }
-  return {{"deviation", {row_json(r.uncompensated.extruding), row_json(r.compensated.extruding)}},
-          {"layers", layers_json(recording.layers)},
-          {"start_layers", recording.start_layers},
-          {"layer_step", recording.paths.layer_step},
-          {"tolerance_mm", recording.paths.tolerance_mm},
-          {"frame",
-           {recording.paths.min_mm.x, recording.paths.min_mm.y, recording.paths.max_mm.x,
-            recording.paths.max_mm.y}},
-          {"features", features_json(recording.features)},
-          {"worst", {places_json(recording.worst_before), places_json(recording.worst_after)}},
-          {"histogram", histogram_json(recording.histogram)},
-          {"frequency_errors", recording.frequency_errors},
-          {"freq_error", r.freq_error},
-          {"contenders", contenders_json(recording.contenders)},
-          {"extruding_s", rounded(r.uncompensated.extruding.duration_s, 0.1)},
-          {"shapers_s", rounded(recording.shapers_measured_s, 0.1)},
-          {"remarks", remarks_json(r)},
-          {"facts", facts_json(r)},
-          {"settings", settings}};
+  return {
+      {"deviation",
+       {row_json(r.measured.uncompensated.extruding), row_json(r.measured.compensated.extruding)}},
+      {"layers", layers_json(recording.layers)},
+      {"start_layers", recording.start_layers},
+      {"layer_step", recording.paths.layer_step},
+      {"tolerance_mm", recording.paths.tolerance_mm},
+      {"frame",
+       {recording.paths.min_mm.x, recording.paths.min_mm.y, recording.paths.max_mm.x,
+        recording.paths.max_mm.y}},
+      {"features", features_json(recording.features)},
+      {"worst", {places_json(recording.worst_before), places_json(recording.worst_after)}},
+      {"histogram", histogram_json(recording.histogram)},
+      {"frequency_errors", recording.frequency_errors},
+      {"freq_error", r.freq_error},
+      {"contenders", contenders_json(recording.contenders)},
+      {"extruding_s", rounded(r.measured.uncompensated.extruding.duration_s, 0.1)},
+      {"shapers_s", rounded(recording.shapers_measured_s, 0.1)},
+      {"remarks", remarks_json(r)},
+      {"facts", facts_json(r)},
+      {"settings", settings}};
 }
 
 constexpr std::string_view kTypical =
@@ -421,30 +313,32 @@ std::string made_for(const Report& r) {
 }
 
 std::string key_figures(const Report& r) {
-  const DeviationRow& before = r.uncompensated.extruding;
-  const DeviationRow& after = r.compensated.extruding;
+  const verify::DeviationStats& before = r.measured.uncompensated.extruding;
+  const verify::DeviationStats& after = r.measured.compensated.extruding;
   const auto figure = [](std::string_view name, std::string_view explanation, double from_mm,
                          double to_mm) {
     return key_figure(name, explanation, um_text(from_mm), um_text(to_mm),
                       times_less(from_mm, to_mm));
   };
   const double change =
-      r.reference_time_s > 0.0 ? 100.0 * (r.emitted_time_s / r.reference_time_s - 1.0) : 0.0;
+      r.measured.uncompensated.time_s > 0.0
+          ? 100.0 * (r.measured.compensated.time_s / r.measured.uncompensated.time_s - 1.0)
+          : 0.0;
   std::string html = R"(<dl class="key-figures">)";
   html += figure("99 % of the time below",
                  "Only during one hundredth of the extruding time is the nozzle further from its "
                  "path than this.",
                  before.contour_p99_mm, after.contour_p99_mm);
-  if (r.uncompensated_corners.count > 0) {
+  if (r.measured.uncompensated.corners.count > 0) {
     html += figure("Typical corner",
                    "How far the nozzle passes from the corners of the path: the root mean square "
                    "over all places where an extruding path turns by more than 20°.",
-                   r.uncompensated_corners.rms_mm, r.compensated_corners.rms_mm);
+                   r.measured.uncompensated.corners.rms_mm, r.measured.compensated.corners.rms_mm);
   }
   html +=
       key_figure("Print time", "As the firmware's planner makes it, heating and macros excluded.",
-                 duration_text(r.reference_time_s), duration_text(r.emitted_time_s),
-                 fmt::format("{:+.2f} %", change));
+                 duration_text(r.measured.uncompensated.time_s),
+                 duration_text(r.measured.compensated.time_s), fmt::format("{:+.2f} %", change));
   return html + "</dl>";
 }
 

@@ -17,14 +17,14 @@ Json literal(const std::string& text) {
   return value.is_discarded() ? Json(text) : value;
 }
 
-Json row_json(const DeviationRow& row) {
+Json row_json(const verify::DeviationStats& row) {
   return {{"contour_max_mm", row.contour_max_mm},    {"contour_p99_mm", row.contour_p99_mm},
           {"contour_rms_mm", row.contour_rms_mm},    {"tracking_max_mm", row.tracking_max_mm},
           {"tracking_rms_mm", row.tracking_rms_mm},  {"duration_s", row.duration_s},
           {"contour_max_line", row.contour_max_line}};
 }
 
-Json corners_json(const CornerRow& row) {
+Json corners_json(const verify::CornerStats& row) {
   return {{"count", row.count},
           {"rms_mm", row.rms_mm},
           {"p99_mm", row.p99_mm},
@@ -32,7 +32,7 @@ Json corners_json(const CornerRow& row) {
           {"max_line", row.max_line}};
 }
 
-Json width_json(const WidthRow& row) {
+Json width_json(const verify::WidthStats& row) {
   return {{"rms", row.rms},
           {"p99", row.p99},
           {"largest", row.largest},
@@ -40,7 +40,7 @@ Json width_json(const WidthRow& row) {
           {"line", row.line}};
 }
 
-Json line_json(const LineRow& row) {
+Json line_json(const verify::LineStats& row) {
   return {{"width", width_json(row.width)},
           {"edge",
            {{"rms_mm", row.edge.rms_mm},
@@ -49,22 +49,23 @@ Json line_json(const LineRow& row) {
             {"line", row.edge.line}}},
           {"first_mm", {{"rms", row.first.rms}, {"mean", row.first.mean}}},
           {"last_mm", {{"rms", row.last.rms}, {"mean", row.last.mean}}},
-          {"less_pressure", width_json(row.less_pressure)},
-          {"more_pressure", width_json(row.more_pressure)},
-          {"earlier", width_json(row.earlier)},
-          {"later", width_json(row.later)}};
+          {"less_pressure", width_json(row.width_with(verify::OtherHotend::less_pressure))},
+          {"more_pressure", width_json(row.width_with(verify::OtherHotend::more_pressure))},
+          {"earlier", width_json(row.width_with(verify::OtherHotend::earlier))},
+          {"later", width_json(row.width_with(verify::OtherHotend::later))}};
 }
 
-Json laid_line_json(const std::optional<LaidLine>& laid) {
-  if (!laid) {
+Json laid_line_json(const verify::Measured& measured) {
+  const verify::LineStats& before = measured.uncompensated.line;
+  if (!before.is_known()) {
     return nullptr;
   }
-  return {{"length_mm", laid->length_mm},
-          {"uncompensated", line_json(laid->uncompensated)},
-          {"compensated", line_json(laid->compensated)}};
+  return {{"length_mm", before.length_mm},
+          {"uncompensated", line_json(before)},
+          {"compensated", line_json(measured.compensated.line)}};
 }
 
-Json flow_json(const FlowRow& row) {
+Json flow_json(const verify::FlowStats& row) {
   return {{"max_mm3_s", row.max_mm3_s},
           {"max_line", row.max_line},
           {"max_change_mm3_s2", row.max_change_mm3_s2},
@@ -94,7 +95,7 @@ Json plants_json(const std::vector<PlantDeviation>& plants) {
   return array;
 }
 
-Json rows_json(const DeviationRows& rows) {
+Json rows_json(const verify::Deviation& rows) {
   return {{"extruding", row_json(rows.extruding)}, {"all", row_json(rows.all)}};
 }
 
@@ -166,7 +167,7 @@ Json shapers_json(const Report& r) {
   return array;
 }
 
-// What the summary says first.
+// The answers that the summary begins with.
 void add_answers(const Report& r, Json& json) {
   const Better first = better(r);
   const Worst second = worst(r);
@@ -191,25 +192,26 @@ void add_answers(const Report& r, Json& json) {
 }
 
 void add_motion(const Report& r, Json& json) {
-  json["print_time_s"] = {{"reference", r.reference_time_s}, {"emitted", r.emitted_time_s}};
+  json["print_time_s"] = {{"reference", r.measured.uncompensated.time_s},
+                          {"emitted", r.measured.compensated.time_s}};
   json["freq_error"] = r.freq_error;
   json["sensitivity"] = sensitivity_json(r.sensitivity);
-  json["deviation"] = {{"uncompensated", rows_json(r.uncompensated)},
-                       {"unshaped", r.unshaped ? rows_json(*r.unshaped) : Json()},
-                       {"compensated", rows_json(r.compensated)}};
-  json["corners"] = {{"uncompensated", corners_json(r.uncompensated_corners)},
-                     {"compensated", corners_json(r.compensated_corners)}};
-  json["laid_line"] = laid_line_json(r.laid_line);
+  json["deviation"] = {{"uncompensated", rows_json(r.measured.uncompensated)},
+                       {"unshaped", r.measured.unshaped ? rows_json(*r.measured.unshaped) : Json()},
+                       {"compensated", rows_json(r.measured.compensated)}};
+  json["corners"] = {{"uncompensated", corners_json(r.measured.uncompensated.corners)},
+                     {"compensated", corners_json(r.measured.compensated.corners)}};
+  json["laid_line"] = laid_line_json(r.measured);
   json["plants"] = plants_json(r.plants);
   json["robustness"] = nullptr;
   if (r.robustness) {
     json["robustness"] = {{"rms_mm", r.robustness->rms_mm},
                           {"nominal_rms_mm", r.robustness->nominal_rms_mm}};
   }
-  json["base"] = {{"max_velocity_mm_s", r.base_max_velocity_mm_s},
-                  {"max_accel_mm_s2", r.base_max_accel_mm_s2},
-                  {"max_step_mm_s", r.base_max_step_mm_s},
-                  {"accel_limit_mm_s2", r.base_accel_limit_mm_s2},
+  json["base"] = {{"max_velocity_mm_s", r.measured.base.max_velocity_mm_s},
+                  {"max_accel_mm_s2", r.measured.base.max_accel_mm_s2},
+                  {"max_step_mm_s", r.measured.base.max_step_mm_s},
+                  {"accel_limit_mm_s2", r.measured.base.accel_limit_mm_s2},
                   {"own_max_velocity_mm_s", r.facts.motor_max_velocity_mm_s},
                   {"own_max_accel_mm_s2", r.facts.motor_max_accel_mm_s2},
                   {"own_max_accel_origin", r.facts.motor_max_accel_origin}};
@@ -221,10 +223,10 @@ void add_timing(const Report& r, Json& json) {
   if (timing.tolerance_mm > 0.0) {
     json["timing"] = {
         {"tolerance_mm", timing.tolerance_mm},
-        {"contour_p999_mm", timing.contour_p999_mm},
-        {"speed_of_feed_p999", timing.speed_p999},
-        {"speed_of_feed_max", timing.speed_max},
-        {"speed_of_feed_max_line", timing.speed_max_line},
+        {"contour_p999_mm", r.measured.compensated.extruding.contour_p999_mm},
+        {"speed_of_feed_p999", r.measured.compensated_feed.p999},
+        {"speed_of_feed_max", r.measured.compensated_feed.max},
+        {"speed_of_feed_max_line", r.measured.compensated_feed.max_line},
         {"pieces_as_sliced", timing.pieces_as_sliced},
         {"as_sliced", fallbacks_json(timing.as_sliced)},
         {"pieces_scaled", timing.pieces_scaled},
@@ -236,71 +238,72 @@ void add_timing(const Report& r, Json& json) {
 }
 
 void add_work(const Report& r, Json& json) {
-  if (r.solver_engine.empty()) {
+  if (r.solver.engine.empty()) {
     // Nothing was solved: an existing file was verified. How it was made is not known.
     for (const char* const key : {"windows", "fallbacks", "kept_moves", "extruded_path",
                                   "unknown_commands", "line_budget", "solver", "shaper_left_off"}) {
       json[key] = nullptr;
     }
-    json["runs"] = {{"total", nullptr}, {"compensated", r.runs_compensated}, {"fallback", nullptr}};
+    json["runs"] = {{"total", nullptr}, {"compensated", r.runs.compensated}, {"fallback", nullptr}};
     return;
   }
-  json["windows"] = {
-      {"total", r.windows_total}, {"solved", r.windows_solved}, {"fallback", r.windows_fallback}};
+  json["windows"] = {{"total", r.runs.windows_total},
+                     {"solved", r.runs.windows_solved},
+                     {"fallback", r.runs.windows_fallback}};
   json["runs"] = {
-      {"total", r.runs_total}, {"compensated", r.runs_compensated}, {"fallback", r.runs_fallback}};
-  json["fallbacks"] = fallbacks_json(r.fallbacks);
+      {"total", r.runs.total}, {"compensated", r.runs.compensated}, {"fallback", r.runs.fallback}};
+  json["fallbacks"] = fallbacks_json(r.runs.fallbacks);
   json["kept_moves"] = Json(r.kept_moves);
   json["extruded_path"] = path_json(r.extruded_path);
   json["unknown_commands"] = unknown_json(r.unknown_commands);
   json["line_budget"] = budget_json(r.line_budget);
-  json["solver"] = {{"engine", r.solver_engine},
-                    {"iterations", r.solver_iterations},
-                    {"checked_windows", r.solver_check.windows},
-                    {"largest_gap", r.solver_check.largest_gap},
-                    {"largest_difference_mm", r.solver_check.largest_difference_mm}};
+  json["solver"] = {{"engine", r.solver.engine},
+                    {"iterations", r.solver.iterations},
+                    {"checked_windows", r.solver.check.windows},
+                    {"largest_gap", r.solver.check.largest_gap},
+                    {"largest_difference_mm", r.solver.check.largest_difference_mm}};
   json["shaper_left_off"] = r.shaper_left_off;
 }
 
 void add_output(const Report& r, Json& json) {
-  json["output_stats"] = {{"lines", r.output_lines},
-                          {"bytes", r.output_bytes},
-                          {"max_lines_per_s", r.max_lines_per_s},
-                          {"segment_ms_median", r.segment_ms_median},
-                          {"worst_run_drift_ms", r.worst_run_drift_ms}};
-  json["extrusion"] = {{"input_mm", r.input_extrusion_mm},
-                       {"output_mm", r.output_extrusion_mm},
-                       {"worst_move_error_mm", r.worst_move_extrusion_error_mm},
-                       {"lag_rms_mm", r.compensated_lag.rms_mm},
-                       {"lag_max_mm", r.compensated_lag.max_mm},
-                       {"lag_max_line", r.compensated_lag.max_line},
-                       {"uncompensated_lag_rms_mm", r.uncompensated_lag.rms_mm},
-                       {"uncompensated_lag_max_mm", r.uncompensated_lag.max_mm},
-                       {"uncompensated_lag_max_line", r.uncompensated_lag.max_line}};
+  json["output_stats"] = {{"lines", r.measured.output.lines},
+                          {"bytes", r.measured.output.bytes},
+                          {"max_lines_per_s", r.measured.output.max_lines_per_s},
+                          {"segment_ms_median", r.measured.output.segment_ms_median},
+                          {"worst_run_drift_ms", 1e3 * r.measured.worst_run_drift_s}};
+  json["extrusion"] = {{"input_mm", r.measured.uncompensated.extrusion_mm},
+                       {"output_mm", r.measured.compensated.extrusion_mm},
+                       {"worst_move_error_mm", r.measured.worst_move_extrusion_error_mm},
+                       {"lag_rms_mm", r.measured.compensated.lag.rms_mm},
+                       {"lag_max_mm", r.measured.compensated.lag.max_mm},
+                       {"lag_max_line", r.measured.compensated.lag.max_line},
+                       {"uncompensated_lag_rms_mm", r.measured.uncompensated.lag.rms_mm},
+                       {"uncompensated_lag_max_mm", r.measured.uncompensated.lag.max_mm},
+                       {"uncompensated_lag_max_line", r.measured.uncompensated.lag.max_line}};
   json["fitted_filament"] = nullptr;
   if (r.fitted_filament) {
-    const Report::FittedFilament& fitted = *r.fitted_filament;
+    const FittedFilament& fitted = *r.fitted_filament;
     json["fitted_filament"] = {
         {"sliced_mm", fitted.sliced_mm},       {"fitted_mm", fitted.fitted_mm},
         {"material_mm3", fitted.material_mm3}, {"least_factor", fitted.least_factor},
         {"most_factor", fitted.most_factor},   {"end_mm", fitted.end_mm}};
   }
-  json["flow"] = {{"uncompensated", flow_json(r.uncompensated_flow)},
-                  {"compensated", flow_json(r.compensated_flow)},
+  json["flow"] = {{"uncompensated", flow_json(r.measured.uncompensated.flow)},
+                  {"compensated", flow_json(r.measured.compensated.flow)},
                   {"largest_difference", nullptr},
                   {"largest_difference_line", nullptr},
                   {"difference_p99", nullptr}};
-  if (r.flow_difference) {
-    json["flow"]["largest_difference"] = r.flow_difference->relative;
-    json["flow"]["largest_difference_line"] = r.flow_difference->line;
-    json["flow"]["difference_p99"] = r.flow_difference->p99;
+  if (r.measured.flow_difference) {
+    json["flow"]["largest_difference"] = r.measured.flow_difference->relative;
+    json["flow"]["largest_difference_line"] = r.measured.flow_difference->line;
+    json["flow"]["difference_p99"] = r.measured.flow_difference->p99;
   }
   json["step_rates"] = step_rates_json(r.step_rates, /*has_output=*/true);
   json["temperature"] = temperature_json(r.temperature);
-  json["performance"] = {{"wall_s", r.wall_s},
-                         {"cpu_s", r.cpu_s},
-                         {"print_s_per_wall_s", r.print_s_per_wall_s},
-                         {"peak_rss_mb", r.peak_rss_mb}};
+  json["performance"] = {{"wall_s", r.performance.wall_s},
+                         {"cpu_s", r.performance.cpu_s},
+                         {"print_s_per_wall_s", r.performance.print_s_per_wall_s},
+                         {"peak_rss_mb", r.performance.peak_rss_mb}};
   json["violation_count"] = r.violation_count;
   json["violations"] = r.violations;
   json["warnings"] = r.warnings;

@@ -119,15 +119,15 @@ void write_answers(Sink out, const Report& r) {
   fmt::format_to(out, "\n");
 }
 
-void write_deviation(Sink out, std::string_view moves, const DeviationRow& before,
-                     const DeviationRow& after) {
+void write_deviation(Sink out, std::string_view moves, const verify::DeviationStats& before,
+                     const verify::DeviationStats& after) {
   fmt::format_to(out, "  {:<16}{:<20}{:<20}{}\n", moves,
                  change_text(before.contour_max_mm, after.contour_max_mm),
                  change_text(before.contour_p99_mm, after.contour_p99_mm),
                  change_text(before.contour_rms_mm, after.contour_rms_mm));
 }
 
-void write_corners(Sink out, const CornerRow& before, const CornerRow& after) {
+void write_corners(Sink out, const verify::CornerStats& before, const verify::CornerStats& after) {
   if (before.count > 0) {
     fmt::format_to(out, "  {:<16}{:<20}{:<20}{}\n", fmt::format("{} corners", before.count),
                    change_text(before.max_mm, after.max_mm),
@@ -136,18 +136,16 @@ void write_corners(Sink out, const CornerRow& before, const CornerRow& after) {
   }
 }
 
-void write_line(Sink out, const std::optional<LaidLine>& line) {
-  if (!line) {
+void write_line(Sink out, const verify::LineStats& before, const verify::LineStats& after) {
+  if (!before.is_known()) {
     return;
   }
-  const LineRow& before = line->uncompensated;
-  const LineRow& after = line->compensated;
   fmt::format_to(out, "  {:<16}{:<20}{:<20}{}\n", "edges of lines",
                  change_text(before.edge.max_mm, after.edge.max_mm),
                  change_text(before.edge.p99_mm, after.edge.p99_mm),
                  change_text(before.edge.rms_mm, after.edge.rms_mm));
-  const auto change = [&](const WidthRow LineRow::*row) {
-    return percent_change_text((before.*row).rms, (after.*row).rms);
+  const auto change = [&](verify::OtherHotend hotend) {
+    return width_change_text(before, after, hotend);
   };
   fmt::format_to(out,
                  "width         {:+.0f} → {:+.0f} % off at most, near lines {} and {}; {:.1f} → "
@@ -156,14 +154,14 @@ void write_line(Sink out, const std::optional<LaidLine>& line) {
                  "the dead time is 2 ms longer\n",
                  100.0 * before.width.largest, 100.0 * after.width.largest, before.width.line,
                  after.width.line, 100.0 * before.width.wide, 100.0 * after.width.wide,
-                 change(&LineRow::less_pressure), change(&LineRow::more_pressure),
-                 change(&LineRow::later));
+                 change(verify::OtherHotend::less_pressure),
+                 change(verify::OtherHotend::more_pressure), change(verify::OtherHotend::later));
 }
 
 // What the printer's own shaper leaves out of the figures before.
-void write_unshaped(Sink out, const std::optional<DeviationRows>& unshaped) {
+void write_unshaped(Sink out, const std::optional<verify::Deviation>& unshaped) {
   if (unshaped) {
-    const DeviationRow& row = unshaped->extruding;
+    const verify::DeviationStats& row = unshaped->extruding;
     fmt::format_to(
         out,
         "shaper        the printer's own is on before; without it, extruding: {} µm max, "
@@ -187,7 +185,7 @@ void write_sensitivity(Sink out, const Report& r) {
   bool has_exact = false;
   for (const Sensitivity& one : r.sensitivity) {
     if (!has_exact && one.frequency_error > 0.0) {
-      add("0", r.compensated.extruding.contour_rms_mm);
+      add("0", r.measured.compensated.extruding.contour_rms_mm);
       has_exact = true;
     }
     add(fmt::format("{:+.0f}", 100.0 * one.frequency_error), one.compensated.rms_mm);
@@ -206,11 +204,14 @@ void write_plants(Sink out, const std::vector<PlantDeviation>& plants) {
 }
 
 void write_times(Sink out, const Report& r) {
-  const double change = r.reference_time_s > 0.0
-                            ? 100.0 * (r.emitted_time_s - r.reference_time_s) / r.reference_time_s
-                            : 0.0;
+  const double change =
+      r.measured.uncompensated.time_s > 0.0
+          ? 100.0 * (r.measured.compensated.time_s - r.measured.uncompensated.time_s) /
+                r.measured.uncompensated.time_s
+          : 0.0;
   fmt::format_to(out, "print time    {} planned, {} emitted ({:+.2f} %)\n",
-                 duration_text(r.reference_time_s), duration_text(r.emitted_time_s), change);
+                 duration_text(r.measured.uncompensated.time_s),
+                 duration_text(r.measured.compensated.time_s), change);
 }
 
 void write_timing(Sink out, const Report& r) {
@@ -221,8 +222,9 @@ void write_timing(Sink out, const Report& r) {
   fmt::format_to(out,
                  "timing        as fast as {:.4g} µm allow: 99.9 % of the time within {} µm, the "
                  "nozzle at {:.3f} F at most\n",
-                 timing.tolerance_mm * 1e3, micrometres_text(timing.contour_p999_mm),
-                 timing.speed_max);
+                 timing.tolerance_mm * 1e3,
+                 micrometres_text(r.measured.compensated.extruding.contour_p999_mm),
+                 r.measured.compensated_feed.max);
   if (timing.pieces_scaled > 0) {
     fmt::format_to(
         out, "              {} {} no optimal timing, and a scaled one instead\n",
@@ -237,34 +239,34 @@ void write_timing(Sink out, const Report& r) {
 }
 
 void write_runs(Sink out, const Report& r) {
-  if (r.runs_total == 0 && r.windows_total == 0) {
+  if (r.runs.total == 0 && r.runs.windows_total == 0) {
     return;
   }
   fmt::format_to(out, "runs          {} of {} stretches of motion compensated, {} stay as sliced\n",
-                 r.runs_compensated, r.runs_total, r.runs_fallback);
-  const std::size_t listed = std::min(r.fallbacks.size(), kListedFallbacks);
+                 r.runs.compensated, r.runs.total, r.runs.fallback);
+  const std::size_t listed = std::min(r.runs.fallbacks.size(), kListedFallbacks);
   for (std::size_t i = 0; i < listed; ++i) {
-    const Fallback& kept = r.fallbacks[i];
+    const Fallback& kept = r.runs.fallbacks[i];
     fmt::format_to(out, "              lines {}-{}: {}\n", kept.first_line, kept.last_line,
                    kept.reason);
   }
-  if (r.runs_fallback > listed) {
+  if (r.runs.fallback > listed) {
     fmt::format_to(out, "              and {} more, listed by --report\n",
-                   r.runs_fallback - listed);
+                   r.runs.fallback - listed);
   }
   for (const auto& [reason, count] : r.kept_moves) {
     fmt::format_to(out, "              {} other moves stay as they are: {}\n", count, reason);
   }
-  fmt::format_to(out, "solver        {}, {} parts, {} iterations\n", r.solver_engine,
-                 r.windows_total, r.solver_iterations);
-  if (r.solver_check.windows > 0) {
+  fmt::format_to(out, "solver        {}, {} parts, {} iterations\n", r.solver.engine,
+                 r.runs.windows_total, r.solver.iterations);
+  if (r.solver.check.windows > 0) {
     fmt::format_to(out, "              on {} of them Ipopt finds the same within {} µm\n",
-                   r.solver_check.windows, micrometres_text(r.solver_check.largest_difference_mm));
+                   r.solver.check.windows, micrometres_text(r.solver.check.largest_difference_mm));
   }
 }
 
 void write_path(Sink out, const Report& r) {
-  if (r.solver_engine.empty() || !(r.extruded_path.total_mm > 0.0)) {
+  if (r.solver.engine.empty() || !(r.extruded_path.total_mm > 0.0)) {
     return;
   }
   fmt::format_to(out, "path          {} of {:.0f} mm extruded are compensated\n",
@@ -277,8 +279,8 @@ void write_path(Sink out, const Report& r) {
 // Most prints ask for as much as before, and then nobody needs to know.
 void write_flow(Sink out, const Report& r) {
   constexpr double kAsBefore = 1.02;
-  const FlowRow& before = r.uncompensated_flow;
-  const FlowRow& after = r.compensated_flow;
+  const verify::FlowStats& before = r.measured.uncompensated.flow;
+  const verify::FlowStats& after = r.measured.compensated.flow;
   if (!r.max_flow_mm3_s && after.max_mm3_s <= kAsBefore * before.max_mm3_s) {
     return;
   }
@@ -288,9 +290,10 @@ void write_flow(Sink out, const Report& r) {
 }
 
 void write_output(Sink out, const Report& r) {
-  fmt::format_to(out, "output        {} lines, {:.1f} MB, {:.0f} lines/s at peak\n", r.output_lines,
-                 static_cast<double>(r.output_bytes) * 1e-6, r.max_lines_per_s);
-  if (!r.solver_engine.empty()) {
+  fmt::format_to(out, "output        {} lines, {:.1f} MB, {:.0f} lines/s at peak\n",
+                 r.measured.output.lines, static_cast<double>(r.measured.output.bytes) * 1e-6,
+                 r.measured.output.max_lines_per_s);
+  if (!r.solver.engine.empty()) {
     const LineBudget& budget = r.line_budget;
     fmt::format_to(out, "lines         having few costs {} µm RMS, {} µm at most; ",
                    micrometres_text(budget.cost_rms_mm), micrometres_text(budget.cost_max_mm));
@@ -301,20 +304,22 @@ void write_output(Sink out, const Report& r) {
                      budget.max_lines_per_s, budget.places_above, budget.above.front().first_line);
     }
   }
-  fmt::format_to(out, "filament      {:.2f} mm in, {:.2f} mm out\n", r.input_extrusion_mm,
-                 r.output_extrusion_mm);
-  if (!r.laid_line) {
+  fmt::format_to(out, "filament      {:.2f} mm in, {:.2f} mm out\n",
+                 r.measured.uncompensated.extrusion_mm, r.measured.compensated.extrusion_mm);
+  if (!r.measured.uncompensated.line.is_known()) {
     fmt::format_to(
         out,
         "              laid {} → {} µm RMS ahead of the nozzle or behind, {} → {} µm at most\n",
-        micrometres_text(r.uncompensated_lag.rms_mm), micrometres_text(r.compensated_lag.rms_mm),
-        micrometres_text(r.uncompensated_lag.max_mm), micrometres_text(r.compensated_lag.max_mm));
+        micrometres_text(r.measured.uncompensated.lag.rms_mm),
+        micrometres_text(r.measured.compensated.lag.rms_mm),
+        micrometres_text(r.measured.uncompensated.lag.max_mm),
+        micrometres_text(r.measured.compensated.lag.max_mm));
   }
-  if (r.flow_difference) {
-    fmt::format_to(out, "              {}\n", flow_difference_text(*r.flow_difference));
+  if (r.measured.flow_difference) {
+    fmt::format_to(out, "              {}\n", flow_difference_text(*r.measured.flow_difference));
   }
   if (r.fitted_filament) {
-    const Report::FittedFilament& fitted = *r.fitted_filament;
+    const FittedFilament& fitted = *r.fitted_filament;
     fmt::format_to(out,
                    "              fitted before: {:.2f} mm of moves that print became {:.2f}, "
                    "{:.1f} mm³ of material\n",
@@ -324,7 +329,8 @@ void write_output(Sink out, const Report& r) {
   fmt::format_to(out, "{}", step_rates_text(r.step_rates, /*has_output=*/true));
   fmt::format_to(out, "{}", temperature_text(r.temperature));
   fmt::format_to(out, "speed         {:.0f} s of print per second, {} in all, {:.0f} MB\n",
-                 r.print_s_per_wall_s, duration_text(r.wall_s), r.peak_rss_mb);
+                 r.performance.print_s_per_wall_s, duration_text(r.performance.wall_s),
+                 r.performance.peak_rss_mb);
 }
 
 }  // namespace
@@ -337,11 +343,16 @@ std::string micrometres_text(double mm) {
   return um >= 10.0 ? fmt::format("{:.1f}", um) : fmt::format("{:.2f}", um);
 }
 
-std::string flow_difference_text(const FlowDifferenceRow& difference) {
+std::string flow_difference_text(const verify::FlowDifference& difference) {
   return fmt::format(
       "at most {:.1f} % {} than as sliced over 10 ms, near line {}; {:.1f} for 99 % of the time",
       100.0 * std::abs(difference.relative), difference.relative < 0.0 ? "less" : "more",
       difference.line, 100.0 * difference.p99);
+}
+
+std::string width_change_text(const verify::LineStats& before, const verify::LineStats& after,
+                              verify::OtherHotend hotend) {
+  return percent_change_text(before.width_with(hotend).rms, after.width_with(hotend).rms);
 }
 
 std::string percent_change_text(double from, double to) {
@@ -432,16 +443,19 @@ std::string to_text(const Report& report) {
   fmt::format_to(out, "{} → {}\n", report.input, report.output);
   write_answers(out, report);
   fmt::format_to(out, "  {:<16}{:<20}{:<20}{}\n", "off path, µm", "max", "p99", "RMS");
-  write_deviation(out, "extruding", report.uncompensated.extruding, report.compensated.extruding);
-  write_deviation(out, "all moves", report.uncompensated.all, report.compensated.all);
-  if (report.compensated.all.contour_max_mm > report.uncompensated.all.contour_max_mm) {
+  write_deviation(out, "extruding", report.measured.uncompensated.extruding,
+                  report.measured.compensated.extruding);
+  write_deviation(out, "all moves", report.measured.uncompensated.all,
+                  report.measured.compensated.all);
+  if (report.measured.compensated.all.contour_max_mm >
+      report.measured.uncompensated.all.contour_max_mm) {
     fmt::format_to(out,
                    "                  (in travel, where nothing is laid, straying is harmless)\n");
   }
-  write_corners(out, report.uncompensated_corners, report.compensated_corners);
-  write_line(out, report.laid_line);
+  write_corners(out, report.measured.uncompensated.corners, report.measured.compensated.corners);
+  write_line(out, report.measured.uncompensated.line, report.measured.compensated.line);
   write_sensitivity(out, report);
-  write_unshaped(out, report.unshaped);
+  write_unshaped(out, report.measured.unshaped);
   write_plants(out, report.plants);
   if (report.robustness) {
     fmt::format_to(

@@ -38,7 +38,7 @@ Admission::Admission(const machine::Settings& settings, const RunRules& rules,
       kept_(&kept),
       report_(&report),
       nozzle_(rules.verify.nozzle, rules.verify.fixed,
-              gcode::Interpreter(rules.emit.interpreter).state().input_shaper()) {}
+              gcode::Interpreter(rules.emit.interpreter).state().shaper) {}
 
 void Admission::admit(RunJob& job) {
   if (!job.piece.is_run) {
@@ -46,7 +46,7 @@ void Admission::admit(RunJob& job) {
     return;
   }
   const Piece& piece = job.piece;
-  report_->runs_total += piece.begins_run() ? 1 : 0;
+  report_->runs.total += piece.begins_run() ? 1 : 0;
   const double asked_accel_mm_s2 = prepare(job);
   const std::vector<std::string> blamed = blamed_before(piece);
   // A run of free timing gets another chance in the timing as sliced.

@@ -46,7 +46,7 @@ double accel_by_lines_mm_s2(const machine::Settings& settings) {
 
 double min_line_mm(const machine::Settings& settings) {
   return spec_of(settings.printer.firmware).motion.skips_short_moves
-             ? (settings.printer.min_steps_per_segment + 1.0) * machine::grid_mm(settings)
+             ? (settings.printer.junctions.min_steps_per_segment + 1.0) * machine::grid_mm(settings)
              : 0.0;
 }
 

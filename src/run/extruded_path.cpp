@@ -13,7 +13,8 @@
 namespace unflex::run {
 namespace {
 
-// If a smaller share of the path is compensated, a warning names so many reasons.
+// If a smaller share of the path is compensated than kEnough, a warning names kNamedReasons of the
+// reasons.
 constexpr double kEnough = 0.95;
 constexpr std::size_t kNamedReasons = 3;
 // A command that costs less path than this is not worth a warning.

@@ -20,9 +20,9 @@ namespace {
 
 // Lines between runs are handed on in portions, so that a long file without motion stays small.
 constexpr std::size_t kMaxEventsOutsideRuns = 4096;
-// In a run, lines without motion are held until it is known what follows. No print has so many in a
-// row, or so many in the part of a run that is held. If there are more, the run ends there as if
-// the machine stopped.
+// In a run, lines without motion are held until it is known what follows. No print has this many in
+// a row, or in the part of a run that is held. If there are more, the run ends there as if the
+// machine stopped.
 constexpr std::size_t kMostInARow = 20'000;
 constexpr std::size_t kMostInARun = 400'000;
 constexpr std::size_t kMaxWarnings = 1000;
@@ -41,7 +41,8 @@ constexpr double kMost_s = 1800.0;
 constexpr std::size_t kMostMoves = 100'000;
 // A part gets the moves around it that take this long.
 constexpr double kAround_s = 0.3;
-// After so many new borders, the reader looks whether the run is long enough to be split.
+// How many new borders come before the reader looks again whether the run is long enough to be
+// split.
 constexpr std::size_t kBordersPerLook = 8;
 
 // The change of velocity from the previous move to this one.

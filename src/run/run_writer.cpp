@@ -57,7 +57,7 @@ RunWriter::RunWriter(const RunRules& rules, std::string input_name, double max_l
       max_lines_per_s_(max_lines_per_s),
       report_(&report),
       emitter_(rules.emit),
-      nozzle_(rules.verify.nozzle, rules.verify.fixed, emitter_.printer().state().input_shaper()),
+      nozzle_(rules.verify.nozzle, rules.verify.fixed, emitter_.printer().state().shaper),
       path_(rules.emit.fixed.firmware) {}
 
 Result<RunWriter::Written> RunWriter::write(const RunJob& job, const RunJob* tried) {
@@ -105,7 +105,7 @@ void RunWriter::begin(const Piece& piece) {
   run_nozzle_ = at_run.nozzle();
 }
 
-// Writes the run at hand, or that of its present try. Returns why it cannot be written, if so.
+// Writes the run at hand, or `tried` in its place. Returns why it cannot be written, if so.
 std::optional<std::string> RunWriter::write_present(const RunJob& job, const RunJob* tried,
                                                     std::string& text) {
   if (run_stands_) {
@@ -360,8 +360,8 @@ std::optional<std::string> RunWriter::try_run(const RunJob& job, const emit::Run
   line_rate_ = std::move(verdict.rate);
   note_lines_above_budget(piece);
   emitter_ = std::move(trial);
-  report_->runs_compensated += piece.begins_run() ? 1 : 0;
-  report_->windows_solved += compensate::windows_to_solve(job.windows.spans);
+  report_->runs.compensated += piece.begins_run() ? 1 : 0;
+  report_->runs.windows_solved += compensate::windows_to_solve(job.windows.spans);
   return std::nullopt;
 }
 
@@ -385,11 +385,11 @@ void RunWriter::note_stretch(const RunJob& job, std::string reason, std::size_t&
 }
 
 void RunWriter::note_fallback(const RunJob& job, std::string reason) {
-  report_->runs_fallback += job.piece.begins_run() ? 1 : 0;
-  report_->windows_fallback += compensate::windows_to_solve(job.windows.spans);
-  if (report_->fallbacks.size() < kMostListed) {
-    report_->fallbacks.push_back({job.piece.events.front().line.number,
-                                  job.piece.events.back().line.number, std::move(reason)});
+  report_->runs.fallback += job.piece.begins_run() ? 1 : 0;
+  report_->runs.windows_fallback += compensate::windows_to_solve(job.windows.spans);
+  if (report_->runs.fallbacks.size() < kMostListed) {
+    report_->runs.fallbacks.push_back({job.piece.events.front().line.number,
+                                       job.piece.events.back().line.number, std::move(reason)});
   }
 }
 

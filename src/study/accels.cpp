@@ -54,7 +54,7 @@ void scale_words(std::string& line, std::initializer_list<std::string_view> begi
   }
 }
 
-Json stats_json(const report::DeviationRow& stats) {
+Json stats_json(const verify::DeviationStats& stats) {
   return {{"contour_rms_mm", stats.contour_rms_mm},
           {"contour_p99_mm", stats.contour_p99_mm},
           {"contour_max_mm", stats.contour_max_mm}};

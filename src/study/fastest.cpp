@@ -173,7 +173,7 @@ Result<AxisShapers> tuned(ShaperKind kind, const Nozzle& nozzle) {
   });
 }
 
-// What Klipper's calibration advises for the axis that smooths more.
+// The limits that Klipper's calibration advises for the axis that smooths more.
 PlanLimits advised_limits(const AxisShapers& shapers) {
   const auto advised = [](const ShaperPulses& pulses) {
     return rivals::advised_accel_mm_s2(pulses);

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "assets.hpp"
 #include "fastest_words.hpp"
 #include "report_parts.hpp"
 #include "unflex/report/format.hpp"
@@ -21,15 +22,6 @@ using report::escape_html;
 using report::micrometres_text;
 using report::Stroke;
 using Sink = std::back_insert_iterator<std::string>;
-
-constexpr std::string_view kStyle = R"css(
-.lead { font-size: 1.15rem; max-width: 60ch; }
-.picture { max-width: 44rem; margin: .75rem 0 0; }
-table.data tr.unflex > * { font-weight: 600; }
-table.data td.none { color: var(--muted); }
-dl.facts { grid-template-columns: minmax(0, max-content) minmax(0, 1fr); }
-dl.facts dt { overflow-wrap: anywhere; }
-)css";
 
 // How a contender is drawn, by its place among them; unflex is drawn as "after" is elsewhere.
 struct Look {
@@ -131,7 +123,7 @@ std::string to_html(const FastestOutcome& outcome) {
   write_warnings(out, outcome.warnings);
   write_settings(out, {{"unflex", outcome.version}}, outcome.printer);
   return report::html_page({.title = "How fast, " + outcome.input,
-                            .style = std::string(kStyle),
+                            .style = std::string(assets::fastest_css),
                             .body = std::move(body),
                             .script = {}});
 }

@@ -5,7 +5,7 @@
 #include <iterator>
 #include <string>
 
-#include "html_assets.hpp"
+#include "assets.hpp"
 #include "html_figures.hpp"
 #include "report_parts.hpp"
 #include "step.hpp"
@@ -243,7 +243,7 @@ void write_figures(Sink out, const Outcome& outcome) {
   fmt::format_to(out, "</section>\n");
 }
 
-// What the methods that solve something solve, and how long it takes.
+// The size of the problem of each method that solves one, and how long it takes.
 void write_problems(Sink out, const Outcome& outcome) {
   fmt::format_to(out,
                  "<section class=\"card\"><h2>How large the problem is</h2><p>{} of both axes, "
@@ -338,9 +338,9 @@ std::string to_html(const Outcome& outcome) {
   write_settings(out, {{"unflex", outcome.version}, {"engine", outcome.engine}}, outcome.printer);
   return report::html_page(
       {.title = outcome.input.empty() ? "Study of the thesis' corner" : "Study of " + outcome.input,
-       .style = std::string(kStyle),
+       .style = std::string(assets::study_css),
        .body = std::move(body),
-       .script = std::string(kScript)});
+       .script = std::string(assets::study_js)});
 }
 
 }  // namespace unflex::study

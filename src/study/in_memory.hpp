@@ -10,7 +10,7 @@
 
 namespace unflex::study {
 
-// Progress of one part of a study, of so many that take alike.
+// Progress of one part of a study. All parts count as equally long.
 class PartProgress final : public Progress {
  public:
   PartProgress(Progress& all, std::size_t part, std::size_t parts)

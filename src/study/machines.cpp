@@ -142,7 +142,7 @@ std::string axis_text(const MachineAxis& axis, const compensate::AxisSetup& know
 }  // namespace
 
 struct MachineBench::Measured {
-  // What one contender leaves on the machine with one shift.
+  // The errors that one contender leaves on the machine with one shift.
   struct Sums {
     verify::DeviationAccumulator distances;
     CornerSums corners;

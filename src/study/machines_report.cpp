@@ -1,10 +1,11 @@
-// What the bench of real machines found: for people, for programs and as a page.
+// The findings of the bench of real machines: for people, for programs and as a page.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <iterator>
 #include <string>
 
+#include "assets.hpp"
 #include "report_parts.hpp"
 #include "unflex/report/format.hpp"
 #include "unflex/report/html_page.hpp"
@@ -18,14 +19,6 @@ using report::escape_html;
 using report::Json;
 using report::micrometres_text;
 using Sink = std::back_insert_iterator<std::string>;
-
-constexpr std::string_view kStyle = R"(
-.machine { display: grid; grid-template-columns: max-content 1fr max-content; gap: .3rem .8rem; }
-.machine i { display: block; height: 1rem; border-radius: 3px; background: var(--before); }
-.machine i.unflex { background: var(--after); }
-.machine b { font-variant-numeric: tabular-nums; font-weight: 600; }
-.note { color: var(--muted); white-space: pre-line; }
-)";
 
 // "-7 %"; "as recorded" for none.
 std::string shift_text(std::size_t shift) {
@@ -156,7 +149,7 @@ std::string to_html(const MachinesOutcome& outcome) {
     fmt::format_to(out, "<p class=\"note\">{}</p></section>\n", escape_html(machine.description));
   }
   return report::html_page({.title = "Real machines, " + outcome.input,
-                            .style = std::string(kStyle),
+                            .style = std::string(assets::machines_css),
                             .body = std::move(body),
                             .script = {}});
 }

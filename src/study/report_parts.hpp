@@ -1,4 +1,5 @@
-// What the reports of several studies share. Outcomes have version, input, printer and warnings.
+// Parts shared by the reports of several studies. Outcomes have version, input, printer and
+// warnings.
 #pragma once
 
 #include <fmt/format.h>

@@ -12,7 +12,7 @@ namespace unflex::study {
 namespace {
 
 constexpr double kLook_s = 5e-5;
-// The nozzle is watched for so long after the last jump: ten periods of the table's axis.
+// How long the nozzle is watched after the last jump: ten periods of the table's axis.
 constexpr double kWatched_s = 0.63;
 constexpr double kWithin = 0.05;
 constexpr double kFreqError = 0.1;

@@ -1,5 +1,5 @@
-// What the nozzle does after a step of the base, plain or as the staircase that a shaper makes of
-// it.
+// The nozzle's motion after a step of the base. The step is plain, or the staircase that a shaper
+// makes of it.
 #pragma once
 
 #include <array>
@@ -58,7 +58,7 @@ struct NamedStaircase {
 // that the shapers are made for.
 [[nodiscard]] std::vector<NamedStaircase> staircases(double zeta, double freq_factor = 1.0);
 
-// What the staircase does to the nozzle, looked at every 0.05 ms; without left_off.
+// How the nozzle follows the staircase, looked at every 0.05 ms; without left_off.
 [[nodiscard]] StepRow step_row(const Staircase& staircase);
 
 // The rows of all bases and all damping ratios.

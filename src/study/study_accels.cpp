@@ -52,8 +52,9 @@ Result<study::AccelsOutcome> study_accels(const flow::Job& job,
     if (!report) {
       return tl::unexpected(report.error());
     }
-    outcome.accels.push_back({accel_mm_s2, report->reference_time_s, report->emitted_time_s,
-                              report->uncompensated.extruding, report->compensated.extruding});
+    outcome.accels.push_back(
+        {accel_mm_s2, report->measured.uncompensated.time_s, report->measured.compensated.time_s,
+         report->measured.uncompensated.extruding, report->measured.compensated.extruding});
     for (const std::string& warning : report->warnings) {
       if (std::ranges::find(outcome.warnings, warning) == outcome.warnings.end()) {
         outcome.warnings.push_back(warning);

@@ -68,7 +68,8 @@ bool lays_filament(const study::PrintPath& path) {
 }
 
 study::PathErrors errors_of(const report::Report& report) {
-  return {report.free_timing.contour_p999_mm, report.compensated.extruding.contour_max_mm};
+  return {report.measured.compensated.extruding.contour_p999_mm,
+          report.measured.compensated.extruding.contour_max_mm};
 }
 
 // The print compensated so that it keeps the tolerance, if that is found. What is written may stray
@@ -93,7 +94,7 @@ Result<report::Report> within(const flow::Job& job, double tolerance_mm,
 }
 
 // unflex as a contender: the print compensated with each tolerance, as the emitted text replays.
-// What it keeps as sliced becomes a warning.
+// Warns of the parts that unflex keeps as sliced.
 Result<study::FastestOfContender> unflex_of(const flow::Job& job,
                                             const std::vector<double>& tolerances_mm,
                                             const study::ToleranceRule& rule, Progress& progress,
@@ -113,15 +114,15 @@ Result<study::FastestOfContender> unflex_of(const flow::Job& job,
     };
     unflex.at.emplace_back();
     if (rule.keeps(errors, tolerance_mm)) {
-      unflex.at.back() = {std::nullopt, report->emitted_time_s, errors};
+      unflex.at.back() = {std::nullopt, report->measured.compensated.time_s, errors};
     } else {
-      warn(
-          fmt::format("takes {:.2f} s, but strays {:.2f} µm for 99.9 % of the time and {:.2f} µm "
-                      "at most",
-                      report->emitted_time_s, 1e3 * errors.p999_mm, 1e3 * errors.max_mm));
+      warn(fmt::format(
+          "takes {:.2f} s, but strays {:.2f} µm for 99.9 % of the time and {:.2f} µm "
+          "at most",
+          report->measured.compensated.time_s, 1e3 * errors.p999_mm, 1e3 * errors.max_mm));
     }
-    if (const std::size_t kept = report->runs_fallback; kept > 0) {
-      warn(fmt::format("keeps {} of {} runs as they were sliced", kept, report->runs_total));
+    if (const std::size_t kept = report->runs.fallback; kept > 0) {
+      warn(fmt::format("keeps {} of {} runs as they were sliced", kept, report->runs.total));
     }
     if (const std::size_t kept = report->free_timing.pieces_as_sliced; kept > 0) {
       warn(fmt::format("keeps the timing of {} stretch{} as sliced", kept, kept == 1 ? "" : "es"));

@@ -90,8 +90,8 @@ Eigen::ArrayXd logarithm_of(const Eigen::VectorXd& p, const Eigen::ArrayXd& freq
   return result;
 }
 
-// What is minimised is the sum of squares of these: the soft L1 loss of each bin, a weak pull of
-// amplitudes towards the order of 1, and what holds gains that nearly cancel back.
+// The fit minimises the sum of squares of these: the soft L1 loss of each bin, a weak pull of
+// amplitudes towards the order of 1, and a penalty for gains that nearly cancel.
 struct Residuals {
   using Scalar = double;
   using InputType = Eigen::VectorXd;

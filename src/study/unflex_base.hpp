@@ -12,7 +12,7 @@ namespace unflex::study {
                                              const std::vector<planner::PlannedMove>& plan,
                                              int parts, const compensate::Engine& engine);
 
-// Lets the base accelerate so much on each axis.
+// Lets the base accelerate by up to accel_mm_s2 on each axis.
 void limit_accel(compensate::Setup& setup, double accel_mm_s2);
 
 // The nozzle at rest there.

@@ -104,14 +104,14 @@ std::vector<LineAhead> lines_of(const std::vector<hotend::Command>& commands,
 
 void renumber(const std::vector<LineAhead>& lines, report::Report& report) {
   const auto now = [&](std::size_t& number) { number = number_behind(lines, number); };
-  now(report.compensated_flow.max_line);
-  now(report.compensated_flow.max_change_line);
+  now(report.measured.compensated.flow.max_line);
+  now(report.measured.compensated.flow.max_change_line);
   for (report::StepRates::Row& motor : report.step_rates.motors) {
     now(motor.emitted_line);
   }
   now(report.step_rates.total.emitted_line);
   now(report.temperature->emitted.worst_line);
-  report.output_lines +=
+  report.measured.output.lines +=
       static_cast<std::size_t>(std::ranges::count(lines, std::size_t{0}, &LineAhead::from_line));
 }
 

@@ -6,18 +6,15 @@
 #include <numeric>
 #include <utility>
 
+#include "tunings.hpp"
 #include "unflex/core/math.hpp"
 
 namespace unflex::timing {
 namespace {
 
-// The power mean of the errors on the pieces is what is compared.
-constexpr double kPower = 4.0;
-// A model of twice the mean error gets so many powers of 2 more.
-constexpr double kResponse = 1.5;
-// The most and, inversely, the least that a share is multiplied by.
-constexpr double kMost = 50.0;
-constexpr double kHardlyAny = 0.02;
+using Tuned = ScalingTunings;
+
+// Keeps the mean error above 0, which is divided by.
 constexpr double kNothing = 1e-6;
 
 // Each model's error on what goes along that axis, where errors of the other one lead off the path.
@@ -31,10 +28,10 @@ std::vector<double> errors_along(gcode::Axis along, const NozzleMeasure& measure
       if (pieces[i].segment.extruding()) {
         const double allowed = allowances.empty() ? 1.0 : allowances[m][i];
         sum += math::pow(std::abs(pieces[i].direction[along]) * measured.of_pieces[m][i] / allowed,
-                         kPower);
+                         Tuned::kPower);
       }
     }
-    errors.push_back(math::pow(sum, 1.0 / kPower) + kNothing);
+    errors.push_back(math::pow(sum, 1.0 / Tuned::kPower) + kNothing);
   }
   return errors;
 }
@@ -68,8 +65,8 @@ void ModelShares::adapt(const std::vector<double>& errors, std::vector<double>& 
       std::accumulate(errors.begin(), errors.end(), 0.0) / static_cast<double>(errors.size());
   factors.resize(errors.size(), 1.0);
   for (std::size_t m = 0; m < errors.size(); ++m) {
-    factors[m] =
-        std::clamp(factors[m] * math::pow(errors[m] / mean, kResponse), 1.0 / kMost, kMost);
+    factors[m] = std::clamp(factors[m] * math::pow(errors[m] / mean, Tuned::kResponse),
+                            1.0 / Tuned::kMostShareFactor, Tuned::kMostShareFactor);
   }
 }
 
@@ -86,7 +83,7 @@ std::vector<compensate::Plant> ModelShares::plants_of(const OfAxis& axis) {
   }
   own *= axis.factors.front();
   std::erase_if(plants, [&](const compensate::Plant& plant) {
-    return plant.share < kHardlyAny * (own + of_plants);
+    return plant.share < Tuned::kHardlyAny * (own + of_plants);
   });
   double sum = own;
   for (const compensate::Plant& plant : plants) {

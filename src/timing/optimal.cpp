@@ -7,19 +7,20 @@
 #include "section_motion.hpp"
 #include "sections.hpp"
 #include "timed_moves.hpp"
+#include "tunings.hpp"
 #include "unflex/planner/plan_times.hpp"
 #include "unflex/timing/timing.hpp"
 
 namespace unflex::timing {
 namespace {
 
-// How long before and after it even motion is settled, in 1/ω.
-constexpr double kSettling = 9.0;
+using Tuned = OptimalTunings;
+
 // Travel that wanders may come too near to what is laid next, and a first plan that is too quick
 // may lead nowhere. So others come after it.
 constexpr FirstPlan kFirstPlans[] = {{0.5, kTravelTolerance_mm}, {0.5, 0.05}, {0.15, 0.05}};
 
-// What the models of the axes ask of the sections. nullopt: more than sections know.
+// The rules for the sections by the models of the axes. nullopt: sections do not know such models.
 std::optional<SectionRules> rules_of(const compensate::Setup& setup) {
   SectionRules rules;
   rules.max_accel_mm_s2 = setup.x.limits.max_accel_mm_s2;
@@ -148,7 +149,7 @@ SectionMotion::Base base_at(const std::vector<TimedPart>& parts, const gcode::Po
 
 // The smoothest motion through these places that has no speed at both ends: b̈ is linear between
 // nodes. By the clamped cubic spline's equations b̈_{k−1} + 4 b̈_k + b̈_{k+1} = 6 (b_{k−1} − 2 b_k +
-// b_{k+1})/h², and 2 b̈_0 + b̈_1 = 6 (b_1 − b_0)/h², likewise at the end.
+// b_{k+1})/h², and 2 b̈_0 + b̈_1 = 6 (b_1 − b_0)/h², and its mirror image at the end.
 dynamics::AxisTrajectory through(std::vector<double> places_mm, double h) {
   const std::size_t last = places_mm.size() - 1;
   const auto chord = [&](std::size_t k) { return (places_mm[k + 1] - places_mm[k]) / h; };
@@ -219,9 +220,8 @@ std::optional<Motion> fastest(std::vector<SectionedPart>& sectioned, const Secti
 
 // The programs break their rows by a hair here and there. The limits of the base's place are hard.
 double within_by_a_hair(double base_mm, const compensate::BaseLimits& limits) {
-  constexpr double kHair_mm = 1e-3;
   const double nearest_mm = std::clamp(base_mm, limits.min_position_mm, limits.max_position_mm);
-  return std::abs(nearest_mm - base_mm) <= kHair_mm ? nearest_mm : base_mm;
+  return std::abs(nearest_mm - base_mm) <= Tuned::kHair_mm ? nearest_mm : base_mm;
 }
 
 dynamics::BaseTrajectory base_on(const compensate::NodeGrid& grid,
@@ -243,8 +243,8 @@ dynamics::BaseTrajectory base_on(const compensate::NodeGrid& grid,
       grid.period_s};
 }
 
-// What the motion breaks when the base moves so; nullptr: nothing. A single place that is a little
-// worse than in the programs is not worth another attempt.
+// The rule that the motion breaks when the base moves so; nullptr: none. A single place that is a
+// little worse than in the programs is not worth another attempt.
 const char* broken_by(const Timed& timed, std::span<const MoveBounds> bounds,
                       const compensate::Setup& setup, const dynamics::NozzleXY& nozzle,
                       const std::optional<Extruder>& extruder) {
@@ -255,10 +255,8 @@ const char* broken_by(const Timed& timed, std::span<const MoveBounds> bounds,
   const std::vector<double> starts_s = planner::starts_s(timed.moves, setup.lead_in_s);
   const NozzleMeasure measured = measure(timed.moves, of_pieces, starts_s, *timed.base,
                                          models_of(setup), {}, &nozzle, extruder);
-  constexpr double kMoreError = 0.03;
-  constexpr double kMoreSpeed = 0.05;
-  if (std::ranges::max(measured.error) > kKept + kMoreError ||
-      std::ranges::max(measured.speed) > kKeptFeed + kMoreSpeed ||
+  if (std::ranges::max(measured.error) > kKept + Tuned::kMoreError ||
+      std::ranges::max(measured.speed) > kKeptFeed + Tuned::kMoreSpeed ||
       std::ranges::max(measured.left) > kKept) {
     return "the nozzle would stray further than the tolerance, or run ahead of F";
   }
@@ -272,7 +270,7 @@ tl::expected<Timed, std::string> optimal_from(
     const std::optional<Extruder>& extruder) {
   const double slowest_rad_s =
       least_of_axes([](const dynamics::Mode& mode) { return mode.omega_rad_s; }, rules);
-  auto parts = sections(course.moves, bounds, setup, kSettling / slowest_rad_s, first);
+  auto parts = sections(course.moves, bounds, setup, Tuned::kSettling_rad / slowest_rad_s, first);
   if (!parts) {
     return tl::unexpected<std::string>("accelerations along the path are limited");
   }

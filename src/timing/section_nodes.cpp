@@ -4,17 +4,13 @@
 #include <cmath>
 #include <limits>
 
+#include "tunings.hpp"
 #include "unflex/core/math.hpp"
 
 namespace unflex::timing {
 namespace {
 
-constexpr std::size_t kFewestPeriods = 18;
-// A path that turns by more has a bound vertex.
-constexpr double kTurn_rad = 0.0873;
-// How near travel has to be to filament for its limits to count, in node periods.
-constexpr double kBesideFeed = 1.5;
-constexpr double kNearVertex = 2.5;
+using Tuned = OptimalTunings;
 
 double u_of(const SectionNodes::Pin& pin) { return static_cast<double>(pin.k) + pin.x; }
 
@@ -30,7 +26,8 @@ SectionNodes::SectionNodes(const Section& section, double node_s) : legs_(sectio
     begins_s.push_back(begins_s.back() + leg.move.duration_s());
   }
   const double duration_s = begins_s.back();
-  periods_ = std::max(kFewestPeriods, static_cast<std::size_t>(std::lround(duration_s / node_s)));
+  periods_ =
+      std::max(Tuned::kFewestPeriods, static_cast<std::size_t>(std::lround(duration_s / node_s)));
   // A short section is begun more slowly.
   period_s_ = duration_s / static_cast<double>(periods_);
   std::size_t leg = 0;
@@ -45,7 +42,7 @@ SectionNodes::SectionNodes(const Section& section, double node_s) : legs_(sectio
     begin /= period_s_;
   }
   bind(begins_s);
-  period_s_ = std::max(period_s_, periods_ == kFewestPeriods ? node_s : 0.0);
+  period_s_ = std::max(period_s_, periods_ == Tuned::kFewestPeriods ? node_s : 0.0);
 }
 
 void SectionNodes::bind(const std::vector<double>& begins) {
@@ -58,7 +55,7 @@ void SectionNodes::bind(const std::vector<double>& begins) {
                            !have_same_feed(legs_[i - 1], legs_[i]) ||
                            legs_[i - 1].tolerance_mm != legs_[i].tolerance_mm ||
                            std::isfinite(legs_[i].entry_mm_s);
-    if (is_border || turned_rad > kTurn_rad) {
+    if (is_border || turned_rad > Tuned::kTurn_rad) {
       turned_rad = 0.0;
       const auto k = std::min(static_cast<std::size_t>(begins[i]), periods_ - 1);
       pins_.push_back({i, k, begins[i] - static_cast<double>(k)});
@@ -119,7 +116,7 @@ double SectionNodes::error_mm(std::size_t k, double x, XY nozzle) const {
 bool SectionNodes::is_near_vertex(std::size_t vertex, std::size_t k, double x) const {
   const auto pin = std::ranges::lower_bound(pins_, vertex, {}, &Pin::vertex);
   return pin != pins_.end() && pin->vertex == vertex &&
-         std::abs(u_of(*pin) - static_cast<double>(k) - x) <= kNearVertex;
+         std::abs(u_of(*pin) - static_cast<double>(k) - x) <= Tuned::kNearVertex;
 }
 
 double SectionNodes::tolerance_mm(std::size_t leg, std::size_t k, double x, double beside) const {
@@ -149,8 +146,8 @@ double SectionNodes::feed_mm_s(std::size_t leg, std::size_t k, double x) const {
   }
   const double u = static_cast<double>(k) + x;
   for (std::size_t i = first_pin_[k > 2 ? k - 2 : 0];
-       i < pins_.size() && u_of(pins_[i]) <= u + kBesideFeed; ++i) {
-    if (u_of(pins_[i]) >= u - kBesideFeed) {
+       i < pins_.size() && u_of(pins_[i]) <= u + Tuned::kBesideFeed; ++i) {
+    if (u_of(pins_[i]) >= u - Tuned::kBesideFeed) {
       for (const std::size_t beside : {pins_[i].vertex - 1, pins_[i].vertex}) {
         if (legs_[beside].lays_filament) {
           feed = std::min(feed, legs_[beside].feed_mm_s);

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "sections.hpp"
+#include "tunings.hpp"
 #include "unflex/core/xy.hpp"
 
 namespace unflex::timing {
@@ -30,8 +31,6 @@ class SectionNodes {
   // Where the first plan is at a node.
   [[nodiscard]] XY place(std::size_t node) const { return places_[node]; }
 
-  static constexpr double kBeside = 2.5;
-
   // A vertex that is bound.
   struct Pin {
     std::size_t vertex = 0;  // the leg that begins there
@@ -47,14 +46,13 @@ class SectionNodes {
   // How far the nozzle is from the path around u.
   [[nodiscard]] double error_mm(std::size_t k, double x, XY nozzle) const;
 
-  // What the nozzle may do on a leg, at u. Beside filament travel keeps to what filament asks for,
+  // The limits of the nozzle on a leg, at u. Beside filament, travel keeps the limits of filament,
   // since lines do not end exactly where filament does.
-  // beside: how near that is, in node periods.
+  // beside: how near to filament that is, in node periods.
   [[nodiscard]] double tolerance_mm(std::size_t leg, std::size_t k, double x,
-                                    double beside = kBeside) const;
+                                    double beside = OptimalTunings::kBesideInRows) const;
   [[nodiscard]] double feed_mm_s(std::size_t leg, std::size_t k, double x) const;
-  // Whether a bound vertex at which the leg begins or ends is near. number: that of the leg that
-  // begins there.
+  // Whether a vertex is bound and near to u. vertex: the number of the leg that begins there.
   [[nodiscard]] bool is_near_vertex(std::size_t vertex, std::size_t k, double x) const;
 
  private:

@@ -5,19 +5,13 @@
 
 #include "bounded_plan.hpp"
 #include "corner_speed.hpp"
+#include "tunings.hpp"
 #include "unflex/core/xy.hpp"
 
 namespace unflex::timing {
 namespace {
 
-// How far the vertices of moves may be from a leg that stands for them: in mm, and as a share of
-// the tolerance.
-constexpr double kStraight_mm = 2e-3;
-constexpr double kStraight = 0.1;
-constexpr std::size_t kMostMovesOfLeg = 50;
-constexpr double kLeastSpeed_mm_s = 1.0;
-// Even motion that lasts less is not worth a cut.
-constexpr double kShortestPause_s = 5e-3;
+using Tuned = OptimalTunings;
 
 double flat_share(const planner::PlannedMove& move) { return length(xy_of(move.direction)); }
 
@@ -57,7 +51,8 @@ std::vector<Leg> joined(const std::vector<Leg>& legs) {
   for (std::size_t i = 0; i < legs.size();) {
     Leg leg = legs[i];
     std::size_t next = i + 1;
-    for (; next < legs.size() && next - i < kMostMovesOfLeg && are_alike(leg, legs[next]); ++next) {
+    for (; next < legs.size() && next - i < Tuned::kMostMovesOfLeg && are_alike(leg, legs[next]);
+         ++next) {
       if (dot(xy_of(leg.move.direction), xy_of(legs[next].move.direction)) <= 0.0) {
         break;
       }
@@ -67,7 +62,7 @@ std::vector<Leg> joined(const std::vector<Leg>& legs) {
       for (std::size_t part = i; part < next; ++part) {
         bulge_mm = std::max(bulge_mm, distance_mm(longer, xy_of(legs[part].move.segment.end_mm)));
       }
-      if (bulge_mm > std::min(kStraight_mm, kStraight * leg.tolerance_mm)) {
+      if (bulge_mm > std::min(Tuned::kStraight_mm, Tuned::kStraightShare * leg.tolerance_mm)) {
         break;
       }
       leg.move = longer;
@@ -95,7 +90,7 @@ void plan(std::vector<Leg>& legs, const compensate::Setup& setup, double accel_s
           corner_speed_mm_s(move, legs[i + 1].move, accel_mm_s2,
                             std::min(legs[i].tolerance_mm, legs[i + 1].tolerance_mm));
       vertex_mm_s.push_back(
-          std::min(std::max(speed_mm_s, kLeastSpeed_mm_s), legs[i + 1].entry_mm_s));
+          std::min(std::max(speed_mm_s, Tuned::kLeastSpeed_mm_s), legs[i + 1].entry_mm_s));
     }
   }
   vertex_mm_s.push_back(0.0);
@@ -129,7 +124,7 @@ void cut(const std::vector<Leg>& legs, double settling_s, std::vector<SectionedP
     const double from_s = leg.move.accel_s + settling_s;
     const double end_s = leg.move.duration_s();
     const double to_s = end_s - leg.move.decel_s - settling_s;
-    if (to_s - from_s < kShortestPause_s) {
+    if (to_s - from_s < Tuned::kShortestPause_s) {
       part.section.legs.push_back(leg);
       continue;
     }
@@ -167,7 +162,7 @@ std::optional<std::vector<SectionedPart>> sections(std::span<const planner::Plan
                                                    std::span<const MoveBounds> bounds,
                                                    const compensate::Setup& setup,
                                                    double settling_s, const FirstPlan& first) {
-  // What limits acceleration along the path more than the base does.
+  // Only a limit below this many times the acceleration of the base counts as one along the path.
   constexpr double kTimesBase = 2.0;
   std::vector<SectionedPart> parts;
   std::vector<Leg> legs;

@@ -60,10 +60,11 @@ const report::Fallback* kept_run(const report::Report& report, const std::string
   };
   const std::size_t first = line_of(tune::band_begins(band));
   const std::size_t last = line_of(tune::band_ends(band));
-  const auto found = std::ranges::find_if(report.fallbacks, [&](const report::Fallback& fallback) {
-    return fallback.last_line >= first && fallback.first_line <= last;
-  });
-  return found == report.fallbacks.end() ? nullptr : &*found;
+  const auto found =
+      std::ranges::find_if(report.runs.fallbacks, [&](const report::Fallback& fallback) {
+        return fallback.last_line >= first && fallback.first_line <= last;
+      });
+  return found == report.runs.fallbacks.end() ? nullptr : &*found;
 }
 
 Result<std::string> compensate_band(const std::string& sliced, const machine::Settings& settings,

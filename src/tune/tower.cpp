@@ -19,7 +19,7 @@ constexpr double kPi = std::numbers::pi;
 
 // A wall is even for so long before its waves begin.
 constexpr double kLeadIn_mm = 3.0;
-// The axis can be seen to swing so many times behind the waves.
+// How many swings of the axis can be seen behind the waves.
 constexpr double kSwingsSeen = 7.0;
 // A swing is so long on the wall that waves can be told apart.
 constexpr double kSwing_mm = 2.2;

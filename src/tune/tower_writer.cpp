@@ -34,7 +34,7 @@ constexpr std::size_t kDeepGroove = 5;
 constexpr double kLiftAtEnd_mm = 10.0;
 constexpr double kClear_mm = 2.0;
 
-// " X… Y…", with so many decimals.
+// " X… Y…" with `decimals` digits behind the point.
 std::string words(const XY& of_axes, int decimals) {
   std::string text;
   for_each_axis([&](std::string_view letter,

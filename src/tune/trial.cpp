@@ -30,7 +30,7 @@ constexpr double kSeen_um = 8.0;
 // So much of the print's acceleration is used for the waves. The rest keeps the speed even.
 constexpr double kShareOfAccel = 0.7;
 constexpr int kMostWaves = 8;
-// The zone shall be so many times as wide as the other value's error alone would close.
+// The zone shall be wider, by this factor, than the zone that the other value's error alone closes.
 constexpr double kWiderThanOther = 1.4;
 constexpr double kNarrowestZone = 0.02;
 // Bands extend kBeyond half-zones past the value's uncertainty.

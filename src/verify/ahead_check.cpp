@@ -8,7 +8,7 @@
 
 namespace unflex::verify {
 
-// What the line asks of the hotend in use.
+// The command that the line gives to the hotend in use.
 std::optional<gcode::HotendCommand> AheadCheck::command(const gcode::Line& line) const {
   const auto command = gcode::hotend_command(gcode::parse(line.content()), firmware_);
   return command && command->tool.value_or(tool_) == tool_ ? command : std::nullopt;

@@ -160,7 +160,7 @@ void Bundle::ride_on(const dynamics::BaseXY& base) {
 void Bundle::begin_steps(double steps, double h) {
   // For fewer steps it does not pay to set up maps.
   constexpr double kManySteps = 6.0;
-  // What an RK4 step may be of 1/ω: the swing is wrong by 2e-5 of itself then.
+  // The longest RK4 step as a share of 1/ω. The swing is then wrong by 2e-5 of itself.
   constexpr double kLongest = 0.3;
   h_ = h;
   rk4_steps_ = std::max(static_cast<int>(std::ceil(fastest_rad_s_ * h / kLongest)), 1);

@@ -43,7 +43,7 @@ class Bundle {
 
   // Base and nozzles are moved by as much.
   void shift(const XY& by_mm);
-  // The base goes on, or stands still, for so long.
+  // The base goes on, or stands still, for this time.
   void settle(const dynamics::BaseXY& base, double duration_s);
   // Whether all nozzles go along with a base in even motion.
   [[nodiscard]] bool rest_on(const dynamics::BaseXY& base) const;

@@ -1,4 +1,4 @@
-// What Bundle (bundle.hpp) does in each step, with nozzles in lanes (unflex/core/lanes.hpp).
+// The steps and looks of Bundle (bundle.hpp), with nozzles in lanes (unflex/core/lanes.hpp).
 #pragma once
 
 #include <array>
@@ -18,10 +18,10 @@ struct BundleArrays {
   std::vector<double> damping_per_s;     // 2ζω
   std::vector<double> gain;
   std::vector<double> lead_s;
-  // Positions likewise, then velocities.
+  // All positions by axis, mode and nozzle, then all velocities in the same order.
   std::vector<double> states;
-  // What a step makes of one unit of position, velocity, velocity of the base and acceleration of
-  // the base: each as states.
+  // The states that a step makes of one unit of position, velocity, velocity of the base and
+  // acceleration of the base. Each map is in the order of `states`.
   std::array<std::vector<double>, 4> maps;
   // By nozzle.
   std::vector<double> nearest;      // number of the nearest piece of the path
@@ -50,15 +50,15 @@ class BundleKernel {
   BundleKernel& operator=(const BundleKernel&) = delete;
   virtual ~BundleKernel() = default;
 
-  // What a step of h seconds does, by so many RK4 steps.
+  // Finds the maps of a step of h seconds, by rk4_steps steps of RK4.
   virtual void set_maps(double h, int rk4_steps, BundleArrays& at) const = 0;
-  // A step that the maps know.
+  // A step of the length that the maps are for.
   virtual void step_by_maps(const dynamics::BaseXY& base, BundleArrays& at) const = 0;
-  // A step of h seconds, by so many RK4 steps.
+  // A step of h seconds without maps, as rk4_steps steps of RK4.
   virtual void step(const dynamics::BaseXY& base, double h, int rk4_steps,
                     BundleArrays& at) const = 0;
-  // c² of the nozzles where they are, and what it has been since the look before, h seconds ago, if
-  // h is not 0. before_h: likewise how long before that another look was.
+  // Finds c² of the nozzles where they are. If h is not 0, the look before was h seconds ago, and
+  // c² is followed from there. before_h: the time between that look and the one before it, or 0.
   virtual void look(const ReferencePath& path, NearPath& near, double before_h, double h,
                     BundleArrays& at) const = 0;
 };

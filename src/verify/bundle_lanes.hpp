@@ -262,7 +262,7 @@ class LaneBundle final : public BundleKernel {
     }
   }
 
-  // What the base, t seconds on, does to the acceleration.
+  // The acceleration that the base causes t seconds on.
   [[nodiscard]] static Lanes push(const Mode& mode, const dynamics::BaseSegment& base, double t) {
     const double position = base.position + t * (base.velocity + 0.5 * base.acceleration * t);
     const double velocity = base.velocity + base.acceleration * t;

@@ -7,7 +7,7 @@
 namespace unflex::verify {
 namespace {
 
-// What is larger by less is rounding, so that an even difference has its first line.
+// A difference that is larger by less counts as equal, so that an even one has its first line.
 constexpr double kRounding = 1e-9;
 // A sliced file that lays less filament than this in the window, 10 µm/s, is no measure.
 constexpr double kLeast_mm = 1e-4;

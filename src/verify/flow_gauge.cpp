@@ -6,7 +6,8 @@
 namespace unflex::verify {
 namespace {
 
-// What is larger by less than this share is rounding, so that a constant flow has its first line.
+// A flow that is larger by less than this share counts as equal, so that a constant one has its
+// first line.
 constexpr double kRounding = 1e-9;
 
 bool is_larger(double value, double than) { return value > than * (1.0 + kRounding); }

@@ -213,7 +213,7 @@ void LaidLine::spread(double pushed_mm) {
   const auto width = static_cast<double>(half);
   for (std::size_t away = 0; away < half; ++away) {
     const double part_mm = pushed_mm * (width - static_cast<double>(away)) / (width * width);
-    // What there is no cell for, at the very beginning, goes into the first one.
+    // At the very beginning there are too few cells. The first one takes what belongs before it.
     cells_[cells_.size() - 1 - std::min(away, cells_.size() - 1)].pushed_mm += part_mm;
     if (away > 0) {
       later_mm_[away - 1] += part_mm;
@@ -310,7 +310,7 @@ void LaidLine::count(const Bin& bin) {
 
 void LaidLine::finish() {
   end_line();
-  // What is still in cells has been pushed for so long.
+  // A cell is laid once kLatency later ones are full. This rest fills them, so that all are laid.
   rest(kCell_s * static_cast<double>(kLatency + 1));
   end_lines_before(lines_ + 1);
 }

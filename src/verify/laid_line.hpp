@@ -30,7 +30,7 @@
 #include "nozzle_place.hpp"
 #include "pressed_filament.hpp"
 #include "unflex/planner/printer_shaper.hpp"
-#include "unflex/verify/line_stats.hpp"
+#include "unflex/verify/line_model.hpp"
 #include "unflex/verify/log_histogram.hpp"
 #include "unflex/verify/observer.hpp"
 #include "unflex/verify/reference_path.hpp"
@@ -69,7 +69,7 @@ class LaidLine {
   // Nothing follows.
   void finish();
 
-  // What has been measured of complete lines.
+  // The figures of all complete lines.
   [[nodiscard]] LineStats stats() const;
 
  private:

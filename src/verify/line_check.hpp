@@ -9,8 +9,9 @@
 
 namespace unflex::verify {
 
-// Equal byte for byte, except for durations in M73 and comments, and for the line ending: a missing
-// one may have been added, and that of Windows may have become the short one, as in binary G-code.
+// Equal byte for byte, except for durations in M73 and comments, and for the line ending. A missing
+// line ending may have been added. One of Windows may have become the short one, as binary G-code
+// has it.
 [[nodiscard]] bool same_line(const gcode::Line& input, const gcode::Line& output);
 
 class LineCheck {

@@ -13,13 +13,10 @@ namespace {
 
 // Times closer together than this are the same; the time axis of a print of days resolves 1e-11 s.
 constexpr double kSameTime_s = 1e-10;
-constexpr double kLagMemory_s = 0.1;
-constexpr double kLagLeastMemory_s = 0.05;
-constexpr double kLagLeastSpeed_mm_s = 5.0;
 
-// In a long cruise we look so often whether the nozzle has come to rest on the base.
+// In a long cruise we look at this interval whether the nozzle has come to rest on the base.
 constexpr double kLook_s = 1.0;
-// If it has, steps may be so many times longer, since nothing but the place changes any more.
+// If it has, steps may be longer by this factor, since nothing but the place changes any more.
 constexpr double kSparser = 6.0;
 
 bool is_cruise(const BasePhase& phase) {
@@ -44,26 +41,6 @@ std::vector<NozzleModel> with(const NozzleModel& model, const std::vector<Nozzle
 }
 
 }  // namespace
-
-void LagEstimate::add(double error_dot_velocity, double velocity2, double h) {
-  if (h != last_h_) {
-    last_h_ = h;
-    keep_ = math::exp(-h / kLagMemory_s);
-  }
-  error_dot_velocity_ = keep_ * error_dot_velocity_ + h * error_dot_velocity;
-  velocity2_ = keep_ * velocity2_ + h * velocity2;
-  weight_s_ = keep_ * weight_s_ + h;
-  if (weight_s_ >= kLagLeastMemory_s &&
-      velocity2_ >= kLagLeastSpeed_mm_s * kLagLeastSpeed_mm_s * weight_s_) {
-    worst_s_ = std::max(worst_s_, std::abs(error_dot_velocity_) / velocity2_);
-  }
-}
-
-void LagEstimate::restart() {
-  error_dot_velocity_ = 0.0;
-  velocity2_ = 0.0;
-  weight_s_ = 0.0;
-}
 
 Meter::Meter(const NozzleModel& model, const std::vector<NozzleModel>& others)
     : bundle_(with(model, others)), near_(verify::reach_s(model)) {}
@@ -94,17 +71,17 @@ void Meter::begin_section(ReferencePath& path, double unplayed_s, double unplaye
     path_ = &path;
     near_.begin(path);
     current_ = path.first();
-    corner_piece_ = path.end();
-    while (corner_piece_ > path.first() && path[corner_piece_ - 1].section == path.section()) {
-      --corner_piece_;
+    if (corners_) {
+      corners_->begin(path);
     }
   }
-  corner_section_ = path.section();
   if (line_) {
     line_->begin_section(path);
   }
   const double begin_s = path.section_start_s() - unplayed_s;
-  corner_shift_s_ += time_s_ - begin_s;
+  if (corners_) {
+    corners_->begin_section(path, time_s_ - begin_s);
+  }
   time_s_ = begin_s;
   laid_mm_ = path.filament_mm() - unplayed_mm;
   section_error_ = {};
@@ -116,8 +93,8 @@ double Meter::base_offset_mm() {
   if (path_->first() == path_->end()) {
     return 0.0;
   }
-  // Before the reference starts, the path near its start counts; after it has ended, that near its
-  // end.
+  // Before the reference starts, the path near its start counts. After it has ended, the path near
+  // its end counts.
   near_.slide(*path_, std::clamp(time_s_, (*path_)[path_->first()].start_s, path_->end_s()));
   std::size_t nearest = 0;
   return std::sqrt(near_.squared_contour_error(*path_, base_mm_, nearest));
@@ -206,7 +183,9 @@ void Meter::play(BasePhase phase) {
 // section has ended.
 double Meter::next_reference_change() {
   path_->extend_to(time_s_ + reach_s());
-  take_corners();
+  if (corners_) {
+    corners_->follow(*path_);
+  }
   current_ = std::max(current_, path_->first());
   while (current_ < path_->end() && (*path_)[current_].end_s <= time_s_ + kSameTime_s) {
     ++current_;
@@ -228,15 +207,14 @@ double Meter::next_reference_change() {
   return piece.end_s;
 }
 
-// Pieces of a later section are on a clock that begin_section() will tell.
-void Meter::take_corners() {
-  if (!corners_) {
-    return;
-  }
-  corner_piece_ = std::max(corner_piece_, path_->first());
-  while (corner_piece_ < path_->end() && (*path_)[corner_piece_].section <= corner_section_) {
-    const PathPiece& piece = (*path_)[corner_piece_++];
-    corners_->follow(piece.move, piece.start_s + corner_shift_s_, piece.end_s + corner_shift_s_);
+// Moves base and nozzles by h seconds. rides: the nozzles rest on the base, and stay so.
+void Meter::step(BasePhase& phase, double h, bool rides) {
+  bundle_.step(phase.xy);
+  advance(phase.xy, h);
+  advance(phase.e, h);
+  advance(phase.pushed, h);
+  if (rides) {
+    bundle_.ride_on(phase.xy);
   }
 }
 
@@ -250,8 +228,10 @@ void Meter::integrate(BasePhase& phase, double duration_s, bool measured) {
   ReferencePhase reference;
   if (measured) {
     path_->extend_to(start_s + duration_s + reach_s());
-    take_corners();
-    reference = reference_phase(duration_s);
+    if (corners_) {
+      corners_->follow(*path_);
+    }
+    reference = reference_phase((*path_)[current_], time_s_, duration_s);
   }
   const bool looks = measured || phase.extruding;
   if (!looks || (last_look_ && last_measured_ != measured)) {
@@ -267,18 +247,12 @@ void Meter::integrate(BasePhase& phase, double duration_s, bool measured) {
   last_measured_ = measured;
   for (double number = 1.0; number <= steps; number += 1.0) {
     const dynamics::NozzleMotionXY from = nozzle;
-    bundle_.step(phase.xy);
-    advance(phase.xy, h);
-    advance(phase.e, h);
-    if (rides) {
-      bundle_.ride_on(phase.xy);
-    }
-    nozzle = bundle_.motion(0);
     const dynamics::BaseSegment pushed_from = phase.pushed;
-    advance(phase.pushed, h);
+    step(phase, h, rides);
+    nozzle = bundle_.motion(0);
     time_s_ = start_s + number * h;
     if (corners_) {
-      pass_corners(from, nozzle, h);
+      corners_->pass(time_s_, from, nozzle, h);
     }
     Sample sample;
     if (looks) {
@@ -288,18 +262,8 @@ void Meter::integrate(BasePhase& phase, double duration_s, bool measured) {
       count(*last_look_, sample, reference, nozzle, measured, phase.extruding, h);
       last_look_ = sample;
     }
-    const bool follows_line = line_ && line_->is_measuring();
-    const bool has_lag = measured && follows_filament_ && (reference.extruding || phase.extruding);
-    if (!waiting_ && (follows_line || has_lag)) {
-      const std::optional<PathPlace> at = place(measured, reference, nozzle);
-      if (has_lag && at) {
-        filament_lag_.add(*path_, *at, laid_mm_ + phase.e.position, phase.extruding, h);
-      }
-      if (follows_line) {
-        line_->add(*path_,
-                   {h, phase.pushed.position - pushed_from.position, pushed_from.velocity,
-                    phase.pushed.velocity, phase.extruding, looks ? bundle_.mean_mm2() : 0.0, at});
-      }
+    if (!waiting_) {
+      count_filament(phase, pushed_from, reference, nozzle, measured, h);
     }
     if (observer_ != nullptr) {
       tell(phase, h, measured, reference, sample);
@@ -308,54 +272,25 @@ void Meter::integrate(BasePhase& phase, double duration_s, bool measured) {
   time_s_ = start_s;
 }
 
-// Between two looks the nozzle goes in a curve, of which the middle shows enough.
-void Meter::pass_corners(const dynamics::NozzleMotionXY& from, const dynamics::NozzleMotionXY& to,
-                         double h) {
-  const double now_s = time_s_ + corner_shift_s_;
-  if (corners_->is_near(now_s - 0.5 * h)) {
-    const auto middle = [&](const dynamics::NozzleMotion& a, const dynamics::NozzleMotion& b) {
-      return 0.5 * (a.position + b.position) + 0.125 * h * (a.velocity - b.velocity);
-    };
-    corners_->sample(now_s - 0.5 * h, map_axes(middle, from, to));
+// Measures the filament's lag and the line of plastic in the h seconds that end now. pushed_from:
+// the filament's motion when they began.
+void Meter::count_filament(const BasePhase& phase, const dynamics::BaseSegment& pushed_from,
+                           const ReferencePhase& reference, const dynamics::NozzleMotionXY& nozzle,
+                           bool measured, double h) {
+  const bool follows_line = line_ && line_->is_measuring();
+  const bool has_lag = measured && follows_filament_ && (reference.extruding || phase.extruding);
+  if (!follows_line && !has_lag) {
+    return;
   }
-  corners_->sample(now_s, dynamics::place_mm(to));
-}
-
-// The reference's motion for the next duration_s. In that time it must change neither its
-// acceleration nor its move.
-Meter::ReferencePhase Meter::reference_phase(double duration_s) const {
-  const PathPiece& piece = (*path_)[current_];
-  const planner::PlannedMove& move = piece.move;
-  const double local_s = time_s_ - piece.start_s;
-  const double middle_s = local_s + 0.5 * duration_s;
-  const double share_xy = move.length_mm > 0.0 ? piece.length_xy_mm / move.length_mm : 0.0;
-  double acceleration = 0.0;
-  double covered = 0.0;
-  double speed = 0.0;
-  if (piece.timing.empty()) {
-    double phase_end_s = 0.0;
-    for (const planner::Phase& phase : move.phases()) {
-      phase_end_s += phase.duration_s;
-      acceleration = phase.accel_mm_s2;
-      if (middle_s < phase_end_s) {
-        break;
-      }
-    }
-    covered = move.distance_mm(local_s) * share_xy;
-    speed = move.velocity_mm_s(local_s) * share_xy;
-  } else {
-    const std::size_t after = piece.passage_after(piece.start_s + middle_s);
-    const Passage& from = piece.timing[after - 1];
-    const Passage& to = piece.timing[after];
-    const double lasts_s = to.time_s - from.time_s;
-    covered = piece.covered_xy_mm(time_s_);
-    speed = lasts_s > 0.0 ? (to.covered_mm - from.covered_mm) / lasts_s * share_xy : 0.0;
+  const std::optional<PathPlace> at = place(measured, reference, nozzle);
+  if (has_lag && at) {
+    filament_lag_.add(*path_, *at, laid_mm_ + phase.e.position, phase.extruding, h);
   }
-  const auto along = [&](double start_mm, double direction) {
-    return dynamics::BaseSegment{start_mm + direction * covered, direction * speed,
-                                 direction * acceleration * share_xy};
-  };
-  return {map_axes(along, piece.start_mm, piece.direction), piece.extruding};
+  if (follows_line) {
+    const double mean_mm2 = measured || phase.extruding ? bundle_.mean_mm2() : 0.0;
+    line_->add(*path_, {h, phase.pushed.position - pushed_from.position, pushed_from.velocity,
+                        phase.pushed.velocity, phase.extruding, mean_mm2, at});
+  }
 }
 
 Meter::Sample Meter::look(const ReferencePhase& reference, const dynamics::NozzleMotionXY& nozzle,
@@ -381,7 +316,7 @@ Meter::Sample Meter::look_at_rest(const dynamics::NozzleMotionXY& nozzle, double
           (*path_)[bundle_.nearest()].move.segment.line};
 }
 
-// What happens between two looks. laying: filament is laid by what is played now.
+// Adds the time between two looks to the figures. laying: the phase being played lays filament.
 void Meter::count(const Sample& from, const Sample& to, const ReferencePhase& reference,
                   const dynamics::NozzleMotionXY& nozzle, bool measured, bool laying, double h) {
   const double tracking2 = 0.5 * (from.tracking2_mm2 + to.tracking2_mm2);
@@ -455,7 +390,8 @@ void Meter::look() {
   static_cast<void>(next_reference_change());
   if (current_ < path_->end() && (*path_)[current_].measured &&
       (*path_)[current_].start_s <= time_s_ + kSameTime_s) {
-    const Sample sample = look(reference_phase(0.0), bundle_.motion(0), 0.0);
+    const Sample sample =
+        look(reference_phase((*path_)[current_], time_s_, 0.0), bundle_.motion(0), 0.0);
     const bool laying = (*path_)[current_].extruding;
     bundle_.count_moment(laying);
     all_.add(bundle_.now_mm2(), sample.tracking2_mm2, 0.0, sample.line);
@@ -479,11 +415,11 @@ void Meter::wait_for_reference() {
   waiting_ = false;
   bundle_.set_states(states);
   last_look_.reset();
-  corner_shift_s_ += time_s_ - time_s;
-  time_s_ = time_s;
   if (corners_) {
+    corners_->set_clock_back(time_s_ - time_s);
     corners_->lift();
   }
+  time_s_ = time_s;
 }
 
 void Meter::hold(double duration_s) {

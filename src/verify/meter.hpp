@@ -9,38 +9,17 @@
 
 #include "bundle.hpp"
 #include "filament_lag.hpp"
+#include "lag_estimate.hpp"
 #include "laid_line.hpp"
+#include "path_corners.hpp"
+#include "reference_phase.hpp"
 #include "shaped_base.hpp"
-#include "unflex/verify/corners.hpp"
 #include "unflex/verify/deviation.hpp"
 #include "unflex/verify/near_path.hpp"
 #include "unflex/verify/observer.hpp"
 #include "unflex/verify/reference_path.hpp"
 
 namespace unflex::verify {
-
-// Estimates by how much the nozzle lags behind the reference, by regression of the tracking error
-// on the reference's velocity with a fading memory: lag = Σ (r − p)·ṙ / Σ |ṙ|². Errors across the
-// path and errors that change sign with the curve of the path cancel; a late clock does not.
-class LagEstimate {
- public:
-  void add(double error_dot_velocity, double velocity2, double h);
-  // Starts afresh, keeping the largest lag found.
-  void restart();
-  [[nodiscard]] double worst_s() const { return worst_s_; }
-  // The present lag; 0 while the reference rests.
-  [[nodiscard]] double present_s() const {
-    return velocity2_ > 0.0 ? std::abs(error_dot_velocity_) / velocity2_ : 0.0;
-  }
-
- private:
-  double error_dot_velocity_ = 0.0;
-  double velocity2_ = 0.0;
-  double weight_s_ = 0.0;
-  double worst_s_ = 0.0;
-  double last_h_ = 0.0;  // h of the last sample
-  double keep_ = 1.0;    // share of the memory that stays after last_h_
-};
 
 // How fast the nozzle goes relative to F.
 class FeedGauge {
@@ -175,24 +154,18 @@ class Meter {
   [[nodiscard]] double swing_mm() const;
 
  private:
-  // The reference during one phase of one of its moves.
-  struct ReferencePhase {
-    dynamics::BaseXY xy;
-    bool extruding = false;
-  };
-
   void integrate(BasePhase& phase, double duration_s, bool measured);
+  void step(BasePhase& phase, double h, bool rides);
   [[nodiscard]] double next_reference_change();
-  void take_corners();
-  void pass_corners(const dynamics::NozzleMotionXY& from, const dynamics::NozzleMotionXY& to,
-                    double h);
-  [[nodiscard]] ReferencePhase reference_phase(double duration_s) const;
-  // What a look shows of the first nozzle.
+  void count_filament(const BasePhase& phase, const dynamics::BaseSegment& pushed_from,
+                      const ReferencePhase& reference, const dynamics::NozzleMotionXY& nozzle,
+                      bool measured, double h);
+  // A look at the first nozzle.
   struct Sample {
     double tracking2_mm2 = 0.0;
     std::size_t line = 0;
   };
-  // nozzle: the first one. since_s: when the last look was; 0 if this one has nothing to do with
+  // nozzle: the first one. since_s: the time since the last look; 0 if this one does not continue
   // it.
   [[nodiscard]] Sample look(const ReferencePhase& reference, const dynamics::NozzleMotionXY& nozzle,
                             double since_s);
@@ -208,7 +181,7 @@ class Meter {
   ReferencePath* path_ = nullptr;
   double time_s_ = 0.0;
   Bundle bundle_;
-  // What was seen last, if it is what the next step begins with.
+  // The last look, if the next step begins with it.
   std::optional<Sample> last_look_;
   bool last_measured_ = false;
   XY base_mm_;
@@ -223,12 +196,7 @@ class Meter {
   // ReferencePath::filament_mm().
   double laid_mm_ = 0.0;
   std::optional<LaidLine> line_;
-  std::optional<CornerGauge> corners_;
-  // What corners_ has of the path: the pieces before this one, in the sections up to this one.
-  std::size_t corner_piece_ = 0;
-  std::size_t corner_section_ = 0;
-  // What corners_ adds to the clock, which jumps where one path takes another's place.
-  double corner_shift_s_ = 0.0;
+  std::optional<PathCorners> corners_;
   FeedGauge feed_;
   bool follow_feed_ = false;
   LagEstimate lag_;

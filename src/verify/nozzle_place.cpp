@@ -1,8 +1,9 @@
 #include "nozzle_place.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include "unflex/verify/nearest_along.hpp"
 
 namespace unflex::verify {
 namespace {
@@ -18,8 +19,8 @@ struct Foot {
 
 Foot foot_on(const PathPiece& piece, const XY& place_mm) {
   const XY off_mm = place_mm - piece.start_mm;
-  const double along_mm = std::clamp(dot(off_mm, piece.direction), 0.0, piece.length_xy_mm);
-  return {along_mm, squared(off_mm - along_mm * piece.direction)};
+  const double along_mm = nearest_along_mm(off_mm, piece.direction, piece.length_xy_mm);
+  return {along_mm, distance2_mm2(off_mm, piece.direction, along_mm)};
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 // Nozzles of different dynamics on one base.
 //
-// Under the printer's own shaper the base moves before the plan: what it does now is known only
+// Under the printer's own shaper the base moves before the plan. Its present motion is known only
 // once the plan is known some ms further. So the nozzles' clock stays behind the moves that have
 // been played, across the ends of sections too, until the machine stands still.
 #pragma once
@@ -18,7 +18,7 @@ class Nozzles {
  public:
   Nozzles(const NozzleModel& model, const Observation& observation, NozzleBase base);
 
-  // What the observer is told from now on that these nozzles hang on.
+  // From now on the observer is told that these nozzles hang on this base.
   void watch_as(NozzleBase base);
   // Only main() goes on.
   void drop_detuned() { main_.drop_others(); }

@@ -19,7 +19,7 @@ class OutputFilament {
  public:
   // A run begins that pushes filament for this hotend.
   void begin_written(const dynamics::HotendPressure& hotend);
-  // What comes now lays what it pushes.
+  // From now on each move lays as much filament as it pushes.
   void begin_plain() { is_written_ = false; }
   [[nodiscard]] OutputMove laid(planner::PlannedMove move);
 

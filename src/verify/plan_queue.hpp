@@ -11,7 +11,7 @@ namespace unflex::verify {
 
 class PlanQueue {
  public:
-  // What the moves are: as the firmware plans them, or as it carries them out.
+  // Whether moves are handed out as the firmware plans them or as it carries them out.
   enum class Motion { planned, played };
 
   PlanQueue(const planner::Limits& limits, const planner::FirmwareConfig& fixed, Motion motion)
@@ -21,7 +21,7 @@ class PlanQueue {
   [[nodiscard]] const planner::Limits& limits() const { return planner_->limits(); }
   void add(const std::vector<gcode::Segment>& segments);
   void stop();
-  // What is added from now on belongs to the next section.
+  // All moves that are added from now on belong to the next section.
   void end_section() { items_.push_back(Item::section_end); }
 
   // Whether a finished move of the current section is at hand.

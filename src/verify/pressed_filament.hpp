@@ -22,7 +22,8 @@ class PressedFilament {
 
   // Another pressure from now on. What is pressed together stays so.
   void set(const dynamics::HotendPressure& hotend);
-  // The extruder pushes so much within duration_s. Returns what comes out meanwhile.
+  // The extruder pushes pushed_mm at even speed within duration_s. Returns the filament that comes
+  // out meanwhile, in mm.
   [[nodiscard]] double push(double duration_s, double pushed_mm);
   // q at the end of the last stretch.
   [[nodiscard]] double flow_mm_s() const { return flow_mm_s_; }
@@ -37,8 +38,8 @@ class PressedFilament {
 
   dynamics::HotendPressure hotend_;
   double flow_mm_s_ = 0.0;
-  // What the extruder has pushed within the dead time, oldest first. With what came before it,
-  // rest, it lasts δ.
+  // How the extruder has turned within the dead time, the oldest stretch first. They last δ
+  // together, since at the beginning a rest stands for the time before.
   std::deque<Stretch> on_the_way_;
 };
 

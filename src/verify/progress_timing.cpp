@@ -5,17 +5,20 @@
 #include <limits>
 #include <utility>
 
+#include "unflex/verify/nearest_along.hpp"
+
 namespace unflex::verify {
 namespace {
 
-// Filament comes that much early or late: it is laid in whole steps, or spread over some lines.
+// Filament comes early or late by up to this, since it is laid in whole steps or spread over some
+// lines.
 constexpr double kSpread_mm = 0.01;
 // λ: the share of the distance along the path that counts, so that s goes as far as the base does
 // where the path comes back to itself.
 constexpr double kAsExpected = 0.02;
-// So much further than expected the nearest place is looked for.
+// The nearest place is looked for up to this far beyond the expected one.
 constexpr double kAhead_mm = 2.0;
-// A place between two passages may be off by so much if it is left out.
+// A passage may be left out if its place is within this distance of even motion without it.
 constexpr double kSamePlace_mm = 1e-4;
 
 // Adds a passage, and drops the one before it where the speed does not change.
@@ -142,10 +145,11 @@ ProgressTiming::Place ProgressTiming::nearest(Place from, const gcode::Position&
     until_mm = std::max(until_mm, place.along_mm);
     double along_mm = until_mm;
     if (on.length_mm > 0.0) {
-      along_mm = dot(base_xy_mm - start_mm, way_mm) / on.length_mm;
-      along_mm = std::clamp(along_mm, place.along_mm, until_mm);
+      along_mm =
+          nearest_along_mm(base_xy_mm - start_mm, way_mm, on.length_mm, place.along_mm, until_mm);
     }
     const double share = on.length_mm > 0.0 ? along_mm / on.length_mm : 1.0;
+    // distance2_mm2() wants a direction of length 1. The division for it would round otherwise.
     const XY off_mm = start_mm + share * way_mm - base_xy_mm;
     const double ahead_mm = on.begin_mm + along_mm - expected_mm;
     const double cost = squared(off_mm) + kAsExpected * ahead_mm * ahead_mm;

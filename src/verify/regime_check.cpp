@@ -65,7 +65,8 @@ std::string modal_difference(const gcode::ModalState& input, const gcode::ModalS
   differences.compare(input.absolute_xyz == output.absolute_xyz, "G90/G91");
   differences.compare(input.e_is_absolute() == output.e_is_absolute(), "M82/M83");
   differences.compare(input.plane == output.plane, "plane (G17 to G19)");
-  differences.compare(input.retracted == output.retracted, "firmware retraction");
+  differences.compare(input.retraction.retracted == output.retraction.retracted,
+                      "firmware retraction");
   differences.compare_relative("unit", input.unit_mm, output.unit_mm);
   differences.compare_relative("feed rate", input.feed_mm_s, output.feed_mm_s);
   differences.compare_relative("speed factor", input.speed_factor, output.speed_factor);

@@ -7,9 +7,9 @@
 
 namespace unflex::verify {
 
-// What differs between the sliced and the emitted file's state at the same place, in words; empty
-// when nothing does. Positions may differ by one rounding step of coordinates. E is compared only
-// if the next E word depends on it.
+// Says in words how the sliced and the emitted file's states differ at the same place; empty if
+// they do not. Positions may differ by one rounding step of coordinates. E is compared only if the
+// next E word depends on it.
 [[nodiscard]] std::string modal_difference(const gcode::ModalState& input,
                                            const gcode::ModalState& output);
 

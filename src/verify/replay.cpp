@@ -35,10 +35,10 @@ bool only_word(const gcode::Command& command, char letter) {
 }
 
 planner::Filters filters_of(const gcode::ModalState& state) {
-  return {state.input_shaper(), state.pressure_advance};
+  return {state.shaper, state.pressure_advance};
 }
 
-// What the line that announces a run says of its lead-in.
+// The lead-in by the line that announces a run; 0 if the line names none.
 double lead_in_s(std::string_view mark) {
   mark.remove_prefix(kRunMark.size());
   mark = mark.substr(0, mark.find(kFreeTimingWord));

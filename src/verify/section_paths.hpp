@@ -17,7 +17,7 @@
 
 namespace unflex::verify {
 
-// How the time of a section's emitted moves relates to that of its sliced moves.
+// How long a section's emitted moves take, compared with its sliced moves.
 enum class Timing {
   kept,       // no compensated run: both files have the same moves
   planned,    // the run lasts as long as the sliced moves do
@@ -57,7 +57,7 @@ class SectionPaths {
 
   // The plan of the whole sliced file.
   [[nodiscard]] ReferencePath& sliced() { return sliced_; }
-  // What the emitted file's nozzle is measured against.
+  // The path that the emitted file's nozzle is measured against.
   [[nodiscard]] ReferencePath& emitted() { return is_run() ? run_ : sliced_; }
   // The path of the nozzle that would follow the run's sliced moves.
   [[nodiscard]] ReferencePath& kept() { return has_own_clock() ? resting_ : run_; }

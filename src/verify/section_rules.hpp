@@ -1,6 +1,6 @@
-// What the motion of a compensated run must keep to besides the limits of BaseCheck: the budget of
-// lines, the neighbourhood of the path, a tail without filament, and a nozzle that strays no more
-// than if the run had been kept as it was sliced, the tail included.
+// The rules for the motion of a compensated run, besides the limits of BaseCheck. The run keeps to
+// the budget of lines. Its base stays near the path. Its tail lays no filament. Its nozzle, in the
+// tail too, strays no more than if the run had been kept as it was sliced.
 //
 // Notation:
 //   ω, ζ   of an axis                      A, v   largest acceleration of a base, its speed

@@ -53,7 +53,7 @@ bool Track::takes_shaper() {
   if (!section().regime) {
     return false;
   }
-  const gcode::Shaper shaper = section().regime->modal.input_shaper();
+  const gcode::Shaper shaper = section().regime->modal.shaper;
   const bool differs = shaper.freq_hz != shaper_.freq_hz || shaper.settings != shaper_.settings;
   shaper_ = shaper;
   return differs;

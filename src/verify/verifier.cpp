@@ -223,7 +223,7 @@ void Verifier::play_run() {
     const gcode::InterpreterOptions& told = rules_.interpreter;
     const bool is_touched =
         any_axis(std::logical_and<>{}, modal.shaper_touched, told.shaper_unknown);
-    if (modal.input_shaper().is_on() || modal.input_shaper().is_unknown() || is_touched) {
+    if (modal.shaper.is_on() || modal.shaper.is_unknown() || is_touched) {
       violations_.in_output(output_.section().line.number,
                             "the printer's input shaper is on in a compensated run");
     }
@@ -298,7 +298,7 @@ void Verifier::set_pressure(Nozzles& nozzles, const Section& section) const {
   }
 }
 
-// What the section of either file makes of the filament in the hotend.
+// Sets by either file's section how its filament is pressed in the hotend.
 void Verifier::follow_pressure(bool compensated) {
   static_cast<void>(input_.replay().has_move());  // so that the regime of a run is known
   set_pressure(original_, input_.section());

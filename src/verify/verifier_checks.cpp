@@ -1,4 +1,4 @@
-// What a run must keep to besides the rules of its motion, and what must be the same in both files.
+// Checks of a run besides the rules of its motion, and of all that must be the same in both files.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -20,15 +20,17 @@ constexpr double kFilamentTolerance_mm = 1.5e-5 + 1e-9;
 bool same_shaper(const gcode::ModalState& a, const gcode::ModalState& b) {
   const bool same_freqs =
       all_axes([](bool unknown, double of_a, double of_b) { return unknown || of_a == of_b; },
-               a.shaper_unknown, a.shaper_freq_hz, b.shaper_freq_hz);
+               a.shaper.unknown, a.shaper.freq_hz, b.shaper.freq_hz);
   const auto is_same = [](double freq_hz, const auto& of_a, const auto& of_b) {
     return freq_hz == 0.0 || of_a == of_b;
   };
-  const bool same_types = all_axes(is_same, a.shaper_freq_hz, a.shaper.type, b.shaper.type);
-  const bool same_damping =
-      all_axes(is_same, a.shaper_freq_hz, a.shaper.damping_ratio, b.shaper.damping_ratio);
+  const bool same_types =
+      all_axes(is_same, a.shaper.freq_hz, a.shaper.settings.type, b.shaper.settings.type);
+  const bool same_damping = all_axes(is_same, a.shaper.freq_hz, a.shaper.settings.damping_ratio,
+                                     b.shaper.settings.damping_ratio);
   // Only a firmware with one shaper for both axes has such words.
-  const bool same_words = is_same(a.shaper_freq_hz.x, a.shaper.custom_words, b.shaper.custom_words);
+  const bool same_words =
+      is_same(a.shaper.freq_hz.x, a.shaper.settings.custom_words, b.shaper.settings.custom_words);
   return same_freqs && same_types && same_damping && same_words;
 }
 
@@ -62,8 +64,8 @@ void Verifier::check_run(bool compensated) {
         fmt::format("the run before lays {:.5f} mm of filament instead of {:.5f} mm",
                     output_.pushed_in_section_mm(), filament_.input_mm()));
   }
-  totals_.worst_move_extrusion_error_mm =
-      std::max({totals_.worst_move_extrusion_error_mm, filament_.worst_move_error_mm(),
+  totals_.measured.worst_move_extrusion_error_mm =
+      std::max({totals_.measured.worst_move_extrusion_error_mm, filament_.worst_move_error_mm(),
                 std::abs(difference_mm)});
   if (compensated) {
     base_.end_run();

@@ -33,7 +33,7 @@ TEST(CommandLine, OfCompensateIsRead) {
   EXPECT_EQ(config.printer_file, "p.toml");
   EXPECT_EQ(config.report, "r.json");
   EXPECT_EQ(config.max_deviation_mm, 0.01);
-  EXPECT_EQ(config.workers, 3U);
+  EXPECT_EQ(config.solve.workers, 3U);
   EXPECT_TRUE(config.quiet);
 }
 
@@ -41,7 +41,7 @@ TEST(CommandLine, InPlaceMakesTheInputTheOutput) {
   const RunConfig config = read({"compensate", "--in-place", "in.gcode"});
   EXPECT_TRUE(config.in_place);
   EXPECT_EQ(config.output, "in.gcode");
-  EXPECT_GE(config.workers, 1U);
+  EXPECT_GE(config.solve.workers, 1U);
 }
 
 TEST(CommandLine, TakesDashesAsStreams) {
@@ -122,9 +122,9 @@ TEST(CommandLine, SuggestsTheCommandThatWasMeant) {
 TEST(CommandLine, TellsWhatAnOptionTakes) {
   EXPECT_THAT(refusal({"compensate", "a", "-o", "b", "--engine", "1"}),
               StartsWith("--engine: '1' is none of auto, banded, ipopt;"));
-  EXPECT_EQ(read({"compensate", "a", "-o", "b", "--engine", "ipopt"}).engine,
+  EXPECT_EQ(read({"compensate", "a", "-o", "b", "--engine", "ipopt"}).solve.engine,
             flow::EngineChoice::ipopt);
-  EXPECT_TRUE(read({"compensate", "a", "-o", "b", "--check-solver"}).check_solver);
+  EXPECT_TRUE(read({"compensate", "a", "-o", "b", "--check-solver"}).solve.check);
   EXPECT_THAT(refusal({"compensate", "a", "-o", "b", "--engine", "ipopt", "--check-solver"}),
               StartsWith("--check-solver: it is Ipopt that checks; leave out --engine ipopt"));
   EXPECT_EQ(read({"identify", "a.csv", "--axis", "Y"}).identify.axis, identify::Axis::y);
@@ -133,7 +133,7 @@ TEST(CommandLine, TellsWhatAnOptionTakes) {
               std::string("--jobs: '") + jobs +
                   "' is not a whole number from 1 to 256; run 'unflex compensate --help'");
   }
-  EXPECT_EQ(read({"compensate", "a", "-o", "b", "-j", "256"}).workers, 256U);
+  EXPECT_EQ(read({"compensate", "a", "-o", "b", "-j", "256"}).solve.workers, 256U);
 }
 
 TEST(CommandLine, HelpHasNoNoiseOfTheLibrary) {

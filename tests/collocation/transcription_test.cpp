@@ -71,30 +71,6 @@ TEST(HargravesParis, HasForDefectTheSlopeErrorOfTheCubicInTheMiddle) {
   }
 }
 
-TEST(HargravesParis, InterpolatesByTheCubicThatMeetsValuesAndSlopes) {
-  const DrivenPendulum problem;
-  std::mt19937_64 random(5);
-  std::uniform_real_distribution<double> unit(0.0, 1.0);
-  for (int trial = 0; trial < 50; ++trial) {
-    const auto both = random_vector(random, 10, 1.5);
-    const PointVector z1 = node(problem, both, 0);
-    const PointVector z2 = node(problem, both, 1);
-    const double t1 = unit(random);
-    const double t2 = t1 + 0.1 + unit(random);
-    StateVector f1(3);
-    StateVector f2(3);
-    problem.dynamics(t1, z1, f1);
-    problem.dynamics(t2, z2, f2);
-    for (const double s : {0.0, 0.5, 1.0, unit(random)}) {
-      const StateVector got = interpolate(problem, t1, z1, t2, z2, s);
-      for (int i = 0; i < 3; ++i) {
-        const Eigen::Vector4d c = cubic_through(t1, z1(i), f1(i), t2, z2(i), f2(i));
-        EXPECT_NEAR(got(i), value(c, t1 + s * (t2 - t1)), 1e-9) << s;
-      }
-    }
-  }
-}
-
 TEST(HargravesParis, OrdersUnknownsByNodesStatesBeforeControls) {
   const DrivenPendulum problem;
   const auto program = transcribe(problem, {0.0, 0.5, 1.5});

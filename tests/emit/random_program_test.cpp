@@ -147,7 +147,7 @@ void expect_same_state(const gcode::ModalState& printer, const gcode::ModalState
   EXPECT_NEAR(printer.feed_mm_s, input.feed_mm_s, 1e-6);
   EXPECT_EQ(printer.speed_factor, input.speed_factor);
   EXPECT_EQ(printer.flow_factor, input.flow_factor);
-  EXPECT_EQ(printer.retracted, input.retracted);
+  EXPECT_EQ(printer.retraction.retracted, input.retraction.retracted);
 }
 
 EmitOptions options() {

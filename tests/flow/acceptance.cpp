@@ -123,25 +123,26 @@ std::string but_for_durations(const std::string& line) {
 
 void expect_kept(const report::Report& report, const machine::Settings& settings) {
   EXPECT_EQ(report.violation_count, 0U) << complaints(report);
-  EXPECT_GT(report.runs_total, 0U);
-  EXPECT_EQ(report.runs_total, report.runs_compensated + report.runs_fallback);
-  EXPECT_LE(report.runs_fallback, report.runs_total / 1000) << complaints(report);
-  EXPECT_EQ(report.fallbacks.size(), report.runs_fallback);
-  EXPECT_EQ(report.windows_total, report.windows_solved + report.windows_fallback);
-  EXPECT_LE(report.emitted_time_s, 1.01 * report.reference_time_s);
-  EXPECT_LE(report.base_max_accel_mm_s2, settings.base_max_accel_mm_s2());
-  EXPECT_LE(report.base_max_velocity_mm_s, settings.base_max_velocity_mm_s());
-  EXPECT_LE(report.max_lines_per_s, settings.max_lines_per_s());
-  EXPECT_NEAR(report.output_extrusion_mm, report.input_extrusion_mm, kFilamentStepMm);
-  EXPECT_LE(report.worst_move_extrusion_error_mm, kFilamentOfNozzleMm);
+  EXPECT_GT(report.runs.total, 0U);
+  EXPECT_EQ(report.runs.total, report.runs.compensated + report.runs.fallback);
+  EXPECT_LE(report.runs.fallback, report.runs.total / 1000) << complaints(report);
+  EXPECT_EQ(report.runs.fallbacks.size(), report.runs.fallback);
+  EXPECT_EQ(report.runs.windows_total, report.runs.windows_solved + report.runs.windows_fallback);
+  EXPECT_LE(report.measured.compensated.time_s, 1.01 * report.measured.uncompensated.time_s);
+  EXPECT_LE(report.measured.base.max_accel_mm_s2, settings.base_max_accel_mm_s2());
+  EXPECT_LE(report.measured.base.max_velocity_mm_s, settings.base_max_velocity_mm_s());
+  EXPECT_LE(report.measured.output.max_lines_per_s, settings.max_lines_per_s());
+  EXPECT_NEAR(report.measured.compensated.extrusion_mm, report.measured.uncompensated.extrusion_mm,
+              kFilamentStepMm);
+  EXPECT_LE(report.measured.worst_move_extrusion_error_mm, kFilamentOfNozzleMm);
 }
 
 void expect_true_path(const report::Report& report, double improvement) {
-  const report::DeviationRow& before = unshaped(report).extruding;
-  const report::DeviationRow& after = report.compensated.extruding;
+  const verify::DeviationStats& before = unshaped(report).extruding;
+  const verify::DeviationStats& after = report.measured.compensated.extruding;
   EXPECT_GT(after.duration_s, 0.0);
-  EXPECT_LE(report.compensated_lag.rms_mm, 10e-3);
-  EXPECT_LT(report.compensated_lag.rms_mm, report.uncompensated_lag.rms_mm);
+  EXPECT_LE(report.measured.compensated.lag.rms_mm, 10e-3);
+  EXPECT_LT(report.measured.compensated.lag.rms_mm, report.measured.uncompensated.lag.rms_mm);
   EXPECT_LE(after.contour_rms_mm, 0.8e-3);
   EXPECT_LE(after.contour_p99_mm, 4e-3);
   EXPECT_LE(after.contour_rms_mm, before.contour_rms_mm / improvement)
@@ -190,9 +191,9 @@ void expect_compensated(const std::string& input, const Expectation& expectation
   EXPECT_EQ(unflex::testing::difference(sliced, emitted, printer), "");
   for (const auto& [name, value] :
        {std::pair{"before_rms_um", unshaped(*report).extruding.contour_rms_mm * 1e3},
-        std::pair{"rms_um", report->compensated.extruding.contour_rms_mm * 1e3},
-        std::pair{"p99_um", report->compensated.extruding.contour_p99_mm * 1e3},
-        std::pair{"max_um", report->compensated.extruding.contour_max_mm * 1e3}}) {
+        std::pair{"rms_um", report->measured.compensated.extruding.contour_rms_mm * 1e3},
+        std::pair{"p99_um", report->measured.compensated.extruding.contour_p99_mm * 1e3},
+        std::pair{"max_um", report->measured.compensated.extruding.contour_max_mm * 1e3}}) {
     ::testing::Test::RecordProperty(name, fmt::format("{:.3f}", value));
   }
 }

@@ -38,7 +38,8 @@ report::Report compensated(const std::string& text, const std::vector<std::strin
   EXPECT_EQ(made->violation_count, 0U) << testing::complaints(*made);
   const Result<report::Report> verified = verify(folder.job(), progress);
   EXPECT_TRUE(verified && verified->violation_count == 0U);
-  EXPECT_NEAR(made->output_extrusion_mm, made->input_extrusion_mm, 2e-5);
+  EXPECT_NEAR(made->measured.compensated.extrusion_mm, made->measured.uncompensated.extrusion_mm,
+              2e-5);
   return *made;
 }
 
@@ -46,14 +47,14 @@ class CarelessFile : public ::testing::TestWithParam<File> {};
 
 TEST_P(CarelessFile, IsCompensatedForMarlin) {
   const report::Report report = compensated(GetParam().text, {"printer.firmware=marlin"});
-  EXPECT_NEAR(report.output_extrusion_mm, GetParam().marlin_mm, 1e-4);
-  EXPECT_GT(report.runs_compensated, 0U) << testing::complaints(report);
+  EXPECT_NEAR(report.measured.compensated.extrusion_mm, GetParam().marlin_mm, 1e-4);
+  EXPECT_GT(report.runs.compensated, 0U) << testing::complaints(report);
 }
 
 TEST_P(CarelessFile, IsCompensatedForRepRapFirmware) {
   const report::Report report = compensated(GetParam().text, {"printer.firmware=rrf"});
-  EXPECT_NEAR(report.output_extrusion_mm, GetParam().rrf_mm, 1e-4);
-  EXPECT_GT(report.runs_compensated, 0U) << testing::complaints(report);
+  EXPECT_NEAR(report.measured.compensated.extrusion_mm, GetParam().rrf_mm, 1e-4);
+  EXPECT_GT(report.runs.compensated, 0U) << testing::complaints(report);
 }
 
 std::string with_returns(std::string text) {
@@ -143,8 +144,8 @@ TEST(MarlinRun, NeedsAMoveThatMarlinTakes) {
   const report::Report report =
       compensated(kCorner + "G1 E-1 F1800\nG1 X100.057\nG1 E1 F1800\nG1 X104 E.2\n",
                   {"printer.firmware=marlin"});
-  EXPECT_EQ(report.runs_total, 4U);
-  EXPECT_EQ(report.runs_compensated, 4U) << testing::complaints(report);
+  EXPECT_EQ(report.runs.total, 4U);
+  EXPECT_EQ(report.runs.compensated, 4U) << testing::complaints(report);
 }
 
 TEST(MarlinRun, HasItsLimitsInMillimetresWhereTheFileIsInInches) {
@@ -154,7 +155,7 @@ TEST(MarlinRun, HasItsLimitsInMillimetresWhereTheFileIsInInches) {
   SilentProgress progress;
   const Result<report::Report> report = compensate(folder.job(), progress);
   ASSERT_TRUE(report) << to_string(report.error());
-  EXPECT_EQ(report->runs_compensated, 1U) << testing::complaints(*report);
+  EXPECT_EQ(report->runs.compensated, 1U) << testing::complaints(*report);
   EXPECT_THAT(folder.output(), ::testing::HasSubstr(";unflex run\nG21\nM201 X1000000 "));
 }
 

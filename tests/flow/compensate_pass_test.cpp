@@ -59,11 +59,11 @@ TEST(CompensatePass, WritesEachRunAndMeasuresAll) {
   ASSERT_TRUE(pass.outcome.status.has_value()) << to_string(pass.outcome.status.error());
   EXPECT_THAT(pass.outcome.blamed, SizeIs(0));
   EXPECT_THAT(pass.output, HasSubstr("\nG4 P500\n"));
-  EXPECT_EQ(pass.report.runs_total, 2U);
-  EXPECT_EQ(pass.report.runs_compensated, 2U);
+  EXPECT_EQ(pass.report.runs.total, 2U);
+  EXPECT_EQ(pass.report.runs.compensated, 2U);
   EXPECT_EQ(pass.report.violation_count, 0U) << testing::complaints(pass.report);
-  EXPECT_EQ(pass.report.windows_total, pass.report.windows_solved);
-  EXPECT_LT(pass.report.compensated.extruding.contour_rms_mm,
+  EXPECT_EQ(pass.report.runs.windows_total, pass.report.runs.windows_solved);
+  EXPECT_LT(pass.report.measured.compensated.extruding.contour_rms_mm,
             0.1 * testing::unshaped(pass.report).extruding.contour_rms_mm);
 }
 
@@ -79,8 +79,8 @@ TEST(CompensatePass, LeavesTheRunsThatItIsTold) {
   ASSERT_TRUE(pass.outcome.status.has_value());
   EXPECT_THAT(pass.output, HasSubstr(kHead + kThere + "G4 P500\n"));
   EXPECT_THAT(pass.output, Not(HasSubstr(kBack)));
-  ASSERT_THAT(pass.report.fallbacks, SizeIs(1));
-  EXPECT_EQ(pass.report.fallbacks[0].reason, "an earlier pass found it worse");
+  ASSERT_THAT(pass.report.runs.fallbacks, SizeIs(1));
+  EXPECT_EQ(pass.report.runs.fallbacks[0].reason, "an earlier pass found it worse");
 }
 
 TEST(CompensatePass, KeepsARunWhoseWindowsHaveNoSolution) {
@@ -91,9 +91,9 @@ TEST(CompensatePass, KeepsARunWhoseWindowsHaveNoSolution) {
   const Pass pass = pass_over(kPrint, none);
   ASSERT_TRUE(pass.outcome.status.has_value());
   EXPECT_EQ(pass.output, kPrint);
-  EXPECT_EQ(pass.report.runs_fallback, 2U);
-  EXPECT_EQ(pass.report.windows_fallback, pass.report.windows_total);
-  EXPECT_THAT(pass.report.fallbacks[0].reason, HasSubstr("none found"));
+  EXPECT_EQ(pass.report.runs.fallback, 2U);
+  EXPECT_EQ(pass.report.runs.windows_fallback, pass.report.runs.windows_total);
+  EXPECT_THAT(pass.report.runs.fallbacks[0].reason, HasSubstr("none found"));
 }
 
 // Processes solve one axis of a window at a time and answer in any order.

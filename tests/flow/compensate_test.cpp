@@ -91,11 +91,12 @@ TEST_P(Fallback, KeepsTheMovesOfTheRunsThatFailedAndSaysWhich) {
   ASSERT_TRUE(report.has_value()) << to_string(report.error());
   EXPECT_EQ(report->violation_count, 0U) << testing::complaints(*report);
   // The islands at 165 and 160, and one travel from each.
-  EXPECT_EQ(report->runs_fallback, 4U) << testing::complaints(*report);
-  EXPECT_EQ(report->runs_total, report->runs_compensated + report->runs_fallback);
-  EXPECT_EQ(report->windows_total, report->windows_solved + report->windows_fallback);
-  ASSERT_EQ(report->fallbacks.size(), 4U);
-  for (const report::Fallback& fallback : report->fallbacks) {
+  EXPECT_EQ(report->runs.fallback, 4U) << testing::complaints(*report);
+  EXPECT_EQ(report->runs.total, report->runs.compensated + report->runs.fallback);
+  EXPECT_EQ(report->runs.windows_total,
+            report->runs.windows_solved + report->runs.windows_fallback);
+  ASSERT_EQ(report->runs.fallbacks.size(), 4U);
+  for (const report::Fallback& fallback : report->runs.fallbacks) {
     EXPECT_THAT(fallback.reason, HasSubstr(GetParam().reason));
   }
   const std::string output = folder.output();
@@ -113,13 +114,13 @@ TEST_P(Fallback, NamesTheLinesOfTheRun) {
   const JobFolder folder(input);
   const Result<report::Report> report = run(folder, GetParam().solve);
   ASSERT_TRUE(report.has_value()) << to_string(report.error());
-  ASSERT_EQ(report->fallbacks.size(), 1U) << testing::complaints(*report);
+  ASSERT_EQ(report->runs.fallbacks.size(), 1U) << testing::complaints(*report);
   const std::size_t first =
       1 + static_cast<std::size_t>(std::count(
               input.begin(), input.begin() + static_cast<std::ptrdiff_t>(input.find(island(165))),
               '\n'));
-  EXPECT_EQ(report->fallbacks[0].first_line, first);
-  EXPECT_EQ(report->fallbacks[0].last_line, first + 5);
+  EXPECT_EQ(report->runs.fallbacks[0].first_line, first);
+  EXPECT_EQ(report->runs.fallbacks[0].last_line, first + 5);
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -170,11 +171,11 @@ TEST(Compensate, LeavesAFileAloneWhereNothingCanBeSolved) {
       });
   ASSERT_TRUE(report.has_value()) << to_string(report.error());
   EXPECT_EQ(folder.output(), input);
-  EXPECT_EQ(report->runs_compensated, 0U);
-  EXPECT_EQ(report->runs_fallback, report->runs_total);
-  EXPECT_EQ(report->windows_fallback, report->windows_total);
+  EXPECT_EQ(report->runs.compensated, 0U);
+  EXPECT_EQ(report->runs.fallback, report->runs.total);
+  EXPECT_EQ(report->runs.windows_fallback, report->runs.windows_total);
   EXPECT_EQ(report->violation_count, 0U);
-  EXPECT_EQ(report->solver_engine, "test engine");
+  EXPECT_EQ(report->solver.engine, "test engine");
 }
 
 // The base of the first solver is off by a micrometre in the middle of each window.
@@ -193,8 +194,8 @@ TEST(SolverCheck, WarnsOfAnEngineThatFindsAnotherMotion) {
     const Result<report::Report> report =
         compensate_with(folder.job(2), {factory(solve), compensate::make_ipopt_engine}, progress);
     ASSERT_TRUE(report.has_value()) << to_string(report.error());
-    EXPECT_EQ(report->solver_check.windows, 8U);
-    EXPECT_NEAR(report->solver_check.largest_difference_mm, off_mm, 5e-5);
+    EXPECT_EQ(report->solver.check.windows, 8U);
+    EXPECT_NEAR(report->solver.check.largest_difference_mm, off_mm, 5e-5);
     const auto warns = ::testing::Contains(
         HasSubstr("the solver and Ipopt do not find the same motion: their costs differ by "));
     if (off_mm > 0.0) {
@@ -218,8 +219,8 @@ class Texts : public ::testing::Test {
       return "";
     }
     EXPECT_EQ(report->violation_count, 0U) << testing::complaints(*report);
-    EXPECT_EQ(report->runs_fallback, fallbacks_) << testing::complaints(*report);
-    EXPECT_GT(report->runs_compensated, 0U);
+    EXPECT_EQ(report->runs.fallback, fallbacks_) << testing::complaints(*report);
+    EXPECT_GT(report->runs.compensated, 0U);
     report_ = *report;
     return folder.output();
   }
@@ -240,16 +241,16 @@ TEST_F(Texts, AreTheSameForAnyNumberOfWorkersWhereRunsHaveManyWindows) {
   const std::string input = print_of({20, 40});
   const std::vector<std::string> windows = {"solve.window_s=0.1"};
   const std::string once = compensated(input, 1, windows);
-  EXPECT_GT(report_.windows_total, 2 * report_.runs_total);
+  EXPECT_GT(report_.runs.windows_total, 2 * report_.runs.total);
   EXPECT_EQ(compensated(input, 3, windows), once);
 }
 
 TEST_F(Texts, DrawNoWorseWhereRunsHaveManyWindows) {
   const std::string input = print_of({20, 40});
   static_cast<void>(compensated(input));
-  const double whole = report_.compensated.extruding.contour_rms_mm;
+  const double whole = report_.measured.compensated.extruding.contour_rms_mm;
   static_cast<void>(compensated(input, 1, {"solve.window_s=0.1"}));
-  EXPECT_NEAR(report_.compensated.extruding.contour_rms_mm, whole, 0.05e-3);
+  EXPECT_NEAR(report_.measured.compensated.extruding.contour_rms_mm, whole, 0.05e-3);
 }
 
 TEST_F(Texts, KeepTheLineEndingsOfTheInput) {
@@ -280,18 +281,19 @@ TEST_F(Texts, LeaveOutMovesWithoutLengthInsideARun) {
   const std::string output = compensated(
       "G90\nM82\nG92 E0\nG1 X100 Y100 Z0.4 F6000\nG4 P500\nG1 X120 Y100 E1\nG1 X120 Y120 E2\n"
       "G1 X120 Y120 E2\nG1 F4000\nG1 X100 Y120 E3\nG1 E2\n");
-  EXPECT_EQ(report_.runs_compensated, 1U);
+  EXPECT_EQ(report_.runs.compensated, 1U);
   EXPECT_EQ(report_.violation_count, 0U);
   EXPECT_THAT(output, Not(HasSubstr("G1 X120 Y120 E2\n")));
   EXPECT_THAT(output, HasSubstr("\nG1 F4000\n"));
-  EXPECT_NEAR(report_.output_extrusion_mm, report_.input_extrusion_mm, 1e-9);
+  EXPECT_NEAR(report_.measured.compensated.extrusion_mm,
+              report_.measured.uncompensated.extrusion_mm, 1e-9);
 }
 
 TEST_F(Texts, EndARunExactlyWhereTheInputIs) {
   const std::string output = compensated(
       "G90\nM83\nG1 X130 Y120 Z0.4 F6000\nG4 P500\nG1 X134.590811296 Y119.150893041 E0.2\n"
       "G1 X134.590811296 Y119.150893041 E0.1\n");
-  EXPECT_EQ(report_.runs_compensated, 1U);
+  EXPECT_EQ(report_.runs.compensated, 1U);
   EXPECT_EQ(report_.violation_count, 0U);
   EXPECT_THAT(output, HasSubstr(" X134.590811296 Y119.150893041 "));
 }
@@ -304,8 +306,8 @@ TEST_F(Texts, DrawASpiralOfSteepSmallTurns) {
                          i % 4 == 2 || i % 4 == 3 ? 108 : 100, 0.2 + 0.075 * i);
   }
   static_cast<void>(compensated(input));
-  EXPECT_EQ(report_.runs_compensated, 1U);
-  EXPECT_LT(report_.compensated.extruding.contour_rms_mm, 5e-4);
+  EXPECT_EQ(report_.runs.compensated, 1U);
+  EXPECT_LT(report_.measured.compensated.extruding.contour_rms_mm, 5e-4);
 }
 
 TEST_F(Texts, EndARunBeforeASteepMoveThatHardlyClimbs) {
@@ -355,9 +357,9 @@ TEST_F(Texts, KeepRunsThatThePlanDrivesHarderThanTheBaseMayBe) {
       "G90\nM83\nG1 X100 Y100 Z0.4 F6000\nM204 S100000\nG4 P500\nG1 X120 Y100 E1\n"
       "G1 X120 Y120 E1\nM104 S0\nM400\nM204 S2000\nG1 X100 Y120 E1\nG1 X100 Y100 E1\n",
       1, {"base.max_accel_mm_s2=20000"});
-  EXPECT_EQ(report_.runs_total, 2U);
-  ASSERT_EQ(report_.fallbacks.size(), 1U);
-  EXPECT_THAT(report_.fallbacks.front().reason, HasSubstr("100000 mm/s²"));
+  EXPECT_EQ(report_.runs.total, 2U);
+  ASSERT_EQ(report_.runs.fallbacks.size(), 1U);
+  EXPECT_THAT(report_.runs.fallbacks.front().reason, HasSubstr("100000 mm/s²"));
   EXPECT_THAT(output, HasSubstr("\nG1 X120 Y100 E1\nG1 X120 Y120 E1\n"));
   EXPECT_EQ(report_.violation_count, 0U);
 }
@@ -373,20 +375,20 @@ std::string square_at(std::string_view accel) {
 TEST_F(Texts, MayAccelerateByWhatThePrintAsksFor) {
   constexpr double kByDefault_mm_s2 = 10000.0;
   static_cast<void>(compensated(square_at("M204 S6000"), 1, {"emit.max_speed_step_mm_s=100"}));
-  EXPECT_GT(report_.base_max_accel_mm_s2, kByDefault_mm_s2);
-  EXPECT_LE(report_.base_max_accel_mm_s2, 12000.0);
+  EXPECT_GT(report_.measured.base.max_accel_mm_s2, kByDefault_mm_s2);
+  EXPECT_LE(report_.measured.base.max_accel_mm_s2, 12000.0);
   EXPECT_THAT(report_.warnings, ::testing::IsEmpty());
   static_cast<void>(compensated(square_at("M204 S6000"), 1,
                                 {"emit.max_speed_step_mm_s=100", "base.max_accel_mm_s2=10000"}));
-  EXPECT_LE(report_.base_max_accel_mm_s2, kByDefault_mm_s2);
+  EXPECT_LE(report_.measured.base.max_accel_mm_s2, kByDefault_mm_s2);
 }
 
 TEST_F(Texts, MayAccelerateByWhatThePrintAsksForOnRepRapFirmware) {
   const std::string output = compensated(square_at("M201 X6000 Y6000"), 1,
                                          {"printer.firmware=rrf", "limits.max_accel_mm_s2=2000"});
   EXPECT_THAT(output, HasSubstr("\nM201 X60000 Y60000 E60000\n"));
-  EXPECT_GT(report_.base_max_accel_mm_s2, 4000.0);
-  EXPECT_LE(report_.base_max_accel_mm_s2, 12000.0);
+  EXPECT_GT(report_.measured.base.max_accel_mm_s2, 4000.0);
+  EXPECT_LE(report_.measured.base.max_accel_mm_s2, 12000.0);
 }
 
 TEST_F(Texts, TellWhereLinesDoNotLetTheBaseAccelerateEnough) {
@@ -404,8 +406,8 @@ TEST_F(Texts, EndWhereMarlinSkipsTheLastMove) {
       "G1 X100 Y100 E2\nG1 X60 Y100 E2\nG1 X60 Y60.2 E2\nG1 X60.02 Y60.14 E.003\n"
       "G1 E-1 F1800\nG1 X62 Y64 F6000\n",
       1, {"printer.firmware=marlin", "base.max_accel_mm_s2=20000"});
-  EXPECT_LT(report_.compensated.extruding.contour_rms_mm, 0.5e-3);
-  EXPECT_LT(report_.compensated.extruding.contour_max_mm, 12e-3);
+  EXPECT_LT(report_.measured.compensated.extruding.contour_rms_mm, 0.5e-3);
+  EXPECT_LT(report_.measured.compensated.extruding.contour_max_mm, 12e-3);
   const std::size_t end = output.find(";unflex end");
   const std::size_t last = output.rfind("G1 X60.02 Y60.14 E.003", end);
   ASSERT_NE(last, std::string::npos);
@@ -446,7 +448,7 @@ TEST_F(Texts, TellWhereTheHotendIsAskedForMoreThanItMelts) {
   ASSERT_TRUE(compensated.has_value());
   EXPECT_THAT(compensated->warnings, ::testing::IsEmpty());
   EXPECT_EQ(compensated->max_flow_mm3_s, 20.0);
-  EXPECT_NEAR(compensated->compensated_flow.max_mm3_s, 12.03, 0.3);
+  EXPECT_NEAR(compensated->measured.compensated.flow.max_mm3_s, 12.03, 0.3);
   folder.set_output(start + "G1 X110 E5 F12000\n");
   const Result<report::Report> verified = verify(folder.job(), progress);
   ASSERT_TRUE(verified.has_value());
@@ -463,7 +465,8 @@ TEST_F(Texts, TellHowLongTheSlicedFileItselfTakes) {
       "G28\nG90\nM83\nG1 Z0.2 F600\nG1 X100 Y100 F9000\nG1 X140 Y100 E2\nG1 X140 Y140 E2\n", 1,
       {"printer.input_shaper_freq_x_hz=0", "printer.input_shaper_freq_y_hz=0"});
   EXPECT_THAT(output, HasSubstr("\nG4 P236\n"));
-  EXPECT_NEAR(report_.emitted_time_s, report_.reference_time_s + 0.236, 0.03);
+  EXPECT_NEAR(report_.measured.compensated.time_s, report_.measured.uncompensated.time_s + 0.236,
+              0.03);
 }
 
 // A layer begins with a move in X, Y and Z, and draws at once.
@@ -476,7 +479,7 @@ TEST_F(Texts, StopTheNozzleBeforeTheyDraw) {
   EXPECT_THAT(output, HasSubstr("\n" + hop + "G4 P0\n;unflex run LEAD_IN=0.011111\n"));
   EXPECT_EQ(output.find("LEAD_IN"), output.rfind("LEAD_IN"));
   // It is 6.28 µm at the very moment when the layer begins, and 5.84 a tenth of a ms later.
-  EXPECT_LT(report_.compensated.extruding.contour_max_mm, 6.3e-3);
+  EXPECT_LT(report_.measured.compensated.extruding.contour_max_mm, 6.3e-3);
 }
 
 // Where a run begins with a bend, the base first gets ahead of the nozzle.
@@ -486,7 +489,7 @@ TEST_F(Texts, BeginWithTheBaseAheadWhereThatIsSeen) {
   const std::string bend = compensated(
       head + "G1 X60.2 Y60.03 E.02 F6000\nG1 X60.4 Y60.1 E.02\nG1 X70 Y66 E1\n", 1, quick);
   EXPECT_THAT(bend, HasSubstr(";unflex run LEAD_IN=0.006000\n"));
-  EXPECT_LT(report_.compensated.extruding.contour_max_mm, 8e-3);
+  EXPECT_LT(report_.measured.compensated.extruding.contour_max_mm, 8e-3);
   const std::string straight = compensated(head + "G1 X80 E1 F6000\nG1 Y80 E1\n", 1, quick);
   EXPECT_THAT(straight, HasSubstr(";unflex run\n"));
   const std::string diagonal = compensated(head + "G1 X80 Y80 E1 F6000\n", 1, quick);
@@ -499,7 +502,7 @@ TEST_F(Texts, EndTravelWithoutASwing) {
       "G90\nM83\nG1 X60 Y60 Z0.6 F6000\nG4 P500\nG1 X152.2 Y148.7 F18000\nG1 Z.2\n"
       "M204 S1000\nG1 X153.3 Y148 E.05 F1800\nG1 X168.6 Y141 E.7\n",
       1, {"limits.max_accel_mm_s2=10000", "dynamics.y.freq_hz=36", "dynamics.freq_error=0.1"});
-  EXPECT_LT(report_.compensated.extruding.contour_max_mm, 10e-3);
+  EXPECT_LT(report_.measured.compensated.extruding.contour_max_mm, 10e-3);
 }
 
 TEST_F(Texts, StopForObjectLabelsAndSavedStates) {
@@ -524,7 +527,7 @@ TEST_F(Texts, OfNothingToCompensateAreTheInput) {
   const Result<report::Report> report = compensate(folder.job(), progress);
   ASSERT_TRUE(report.has_value());
   EXPECT_EQ(folder.output(), input);
-  EXPECT_EQ(report->runs_total, 0U);
+  EXPECT_EQ(report->runs.total, 0U);
 }
 
 TEST_F(Texts, AreNotCompensatedTwice) {
@@ -539,8 +542,8 @@ TEST_F(Texts, AreNotCompensatedTwice) {
 
 TEST_F(Texts, StayWithinTheBudgetOfLines) {
   static_cast<void>(compensated(print_of({20, 60}), 1, {"emit.max_lines_per_s=200"}));
-  EXPECT_LE(report_.max_lines_per_s, 200.0);
-  EXPECT_GE(report_.segment_ms_median, 5.0 - 1e-3);
+  EXPECT_LE(report_.measured.output.max_lines_per_s, 200.0);
+  EXPECT_GE(report_.measured.output.segment_ms_median, 5.0 - 1e-3);
 }
 
 TEST_F(Texts, RewriteDenseWipesWhereTheirLimitsCanBeRaised) {
@@ -557,10 +560,10 @@ TEST_F(Texts, RewriteDenseWipesWhereTheirLimitsCanBeRaised) {
         compensated(input, 1,
                     {std::string("printer.firmware=") + firmware, "emit.max_lines_per_s=200",
                      "limits.max_e_velocity_mm_s=50"});
-    EXPECT_LE(report_.max_lines_per_s, 200.0) << firmware;
+    EXPECT_LE(report_.measured.output.max_lines_per_s, 200.0) << firmware;
     EXPECT_THAT(output, Not(HasSubstr(wipe.substr(0, wipe.find('\n'))))) << firmware;
     EXPECT_FALSE(report_.kept_moves.contains("retracting move")) << firmware;
-    EXPECT_NEAR(report_.output_extrusion_mm, 2.0 - 40 * 0.05 - 0.3, 1e-9) << firmware;
+    EXPECT_NEAR(report_.measured.compensated.extrusion_mm, 2.0 - 40 * 0.05 - 0.3, 1e-9) << firmware;
   }
   EXPECT_THAT(compensated(input), HasSubstr(wipe));
   EXPECT_EQ(report_.kept_moves["retracting move"], 40U);
@@ -576,8 +579,8 @@ TEST_F(Texts, KeepToTheBudgetWhereTheSlicedLinesDoNot) {
   for (const char* const firmware : {"klipper", "marlin", "rrf"}) {
     static_cast<void>(compensated(
         input, 1, {std::string("printer.firmware=") + firmware, "emit.max_lines_per_s=200"}));
-    EXPECT_LE(report_.max_lines_per_s, 200.0) << firmware;
-    EXPECT_NEAR(report_.output_extrusion_mm, 1.0 + 30 * 0.023, 1e-9) << firmware;
+    EXPECT_LE(report_.measured.output.max_lines_per_s, 200.0) << firmware;
+    EXPECT_NEAR(report_.measured.compensated.extrusion_mm, 1.0 + 30 * 0.023, 1e-9) << firmware;
   }
 }
 
@@ -587,9 +590,9 @@ TEST_F(Texts, AreVerifiedWithTheSameFiguresAgain) {
   const Result<report::Report> made = compensate(folder.job(), progress);
   const Result<report::Report> verified = verify(folder.job(), progress);
   ASSERT_TRUE(made.has_value() && verified.has_value());
-  EXPECT_EQ(verified->compensated.extruding.contour_rms_mm,
-            made->compensated.extruding.contour_rms_mm);
-  EXPECT_EQ(verified->emitted_time_s, made->emitted_time_s);
+  EXPECT_EQ(verified->measured.compensated.extruding.contour_rms_mm,
+            made->measured.compensated.extruding.contour_rms_mm);
+  EXPECT_EQ(verified->measured.compensated.time_s, made->measured.compensated.time_s);
   EXPECT_EQ(verified->violation_count, 0U);
 }
 

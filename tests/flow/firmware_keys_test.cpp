@@ -61,7 +61,8 @@ TEST_P(FirmwareKey, ChangesThePlan) {
   const Inspection before = plan(overrides);
   overrides.push_back(tested.setting);
   const Inspection after = plan(overrides);
-  EXPECT_TRUE(before.reference_time_s != after.reference_time_s || before.moves != after.moves ||
+  EXPECT_TRUE(before.reference_time_s != after.reference_time_s ||
+              before.counts.moves != after.counts.moves ||
               before.filament_mm != after.filament_mm || before.max_mm != after.max_mm);
 }
 
@@ -172,7 +173,7 @@ TEST(FirmwareKeys, BelowWhatRepRapFirmwareTakesAreWhatItMakesOfThem) {
   const Printed printed =
       compensated({"printer.firmware=rrf", "limits.jerk_e_mm_s=0",
                    "limits.min_movement_velocity_mm_s=0.001", "limits.max_z_accel_mm_s2=0.01"});
-  EXPECT_EQ(printed.report.runs_compensated, 1U);
+  EXPECT_EQ(printed.report.runs.compensated, 1U);
   EXPECT_THAT(printed.text, ::testing::HasSubstr("M566 X900 Y900 E6 P0\n"));
 }
 

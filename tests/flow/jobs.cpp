@@ -23,8 +23,8 @@ void write_file(const std::filesystem::path& file, std::string_view text) {
   EXPECT_TRUE(stream.flush()) << file;
 }
 
-const report::DeviationRows& unshaped(const report::Report& report) {
-  return report.unshaped ? *report.unshaped : report.uncompensated;
+const verify::Deviation& unshaped(const report::Report& report) {
+  return report.measured.unshaped ? *report.measured.unshaped : report.measured.uncompensated;
 }
 
 machine::Settings settings(const std::vector<std::string>& overrides) {
@@ -36,10 +36,10 @@ machine::Settings settings(const std::vector<std::string>& overrides) {
   // A Klipper has a shaper, so that every test sees it switched off and on again.
   machine::PrinterSettings& printer = loaded->printer;
   if (printer.firmware == Firmware::klipper) {
-    printer.input_shaper_freq_hz.x =
-        printer.input_shaper_freq_hz.x.value_or(loaded->dynamics.x.freq_hz);
-    printer.input_shaper_freq_hz.y =
-        printer.input_shaper_freq_hz.y.value_or(loaded->dynamics.y.freq_hz);
+    printer.input_shaper.freq_hz.x =
+        printer.input_shaper.freq_hz.x.value_or(loaded->dynamics.x.freq_hz);
+    printer.input_shaper.freq_hz.y =
+        printer.input_shaper.freq_hz.y.value_or(loaded->dynamics.y.freq_hz);
   }
   return *loaded;
 }
@@ -71,7 +71,7 @@ std::string complaints(const report::Report& report) {
   for (const std::string& violation : report.violations) {
     text += violation + "\n";
   }
-  for (const report::Fallback& fallback : report.fallbacks) {
+  for (const report::Fallback& fallback : report.runs.fallbacks) {
     text += fmt::format("lines {} to {} kept: {}\n", fallback.first_line, fallback.last_line,
                         fallback.reason);
   }

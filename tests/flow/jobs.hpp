@@ -17,7 +17,7 @@ void write_file(const std::filesystem::path& file, std::string_view text);
 [[nodiscard]] machine::Settings settings(const std::vector<std::string>& overrides = {});
 
 // The deviation of the sliced print as played without an input shaper.
-[[nodiscard]] const report::DeviationRows& unshaped(const report::Report& report);
+[[nodiscard]] const verify::Deviation& unshaped(const report::Report& report);
 
 // A directory with one input and one output, deleted with the object.
 class JobFolder {

@@ -71,19 +71,23 @@ TEST_P(LaidLine, IsAsWideAsSliced) {
   overrides.push_back("pressure.written=false");
   const report::Report own = compensated(walls(), overrides, output);
   EXPECT_THAT(output, Not(HasSubstr(GetParam().in_runs)));
-  ASSERT_TRUE(written.laid_line && own.laid_line);
-  const report::LineRow& line = written.laid_line->compensated;
-  EXPECT_LT(line.width.rms, GetParam().most * own.laid_line->compensated.width.rms);
-  EXPECT_LT(line.width.rms, 0.5 * written.laid_line->uncompensated.width.rms);
-  EXPECT_LT(line.edge.rms_mm, GetParam().most * own.laid_line->compensated.edge.rms_mm);
+  ASSERT_TRUE(written.measured.uncompensated.line.is_known() &&
+              own.measured.uncompensated.line.is_known());
+  const verify::LineStats& line = written.measured.compensated.line;
+  EXPECT_LT(line.width.rms, GetParam().most * own.measured.compensated.line.width.rms);
+  EXPECT_LT(line.width.rms, 0.5 * written.measured.uncompensated.line.width.rms);
+  EXPECT_LT(line.edge.rms_mm, GetParam().most * own.measured.compensated.line.edge.rms_mm);
   // The sliced file is the same.
-  EXPECT_EQ(written.laid_line->uncompensated.width.rms, own.laid_line->uncompensated.width.rms);
+  EXPECT_EQ(written.measured.uncompensated.line.width.rms,
+            own.measured.uncompensated.line.width.rms);
   // All else is as without.
-  EXPECT_NEAR(written.compensated.extruding.contour_rms_mm,
-              own.compensated.extruding.contour_rms_mm,
-              0.1 * own.compensated.extruding.contour_rms_mm);
-  EXPECT_NEAR(written.output_extrusion_mm, own.output_extrusion_mm, 1e-4);
-  EXPECT_NEAR(written.emitted_time_s, own.emitted_time_s, 2e-3 * own.emitted_time_s);
+  EXPECT_NEAR(written.measured.compensated.extruding.contour_rms_mm,
+              own.measured.compensated.extruding.contour_rms_mm,
+              0.1 * own.measured.compensated.extruding.contour_rms_mm);
+  EXPECT_NEAR(written.measured.compensated.extrusion_mm, own.measured.compensated.extrusion_mm,
+              1e-4);
+  EXPECT_NEAR(written.measured.compensated.time_s, own.measured.compensated.time_s,
+              2e-3 * own.measured.compensated.time_s);
 }
 
 // With a bowden the nozzle may not go as fast as its own tolerance would let it.
@@ -96,10 +100,11 @@ TEST(LaidLineOfABowden, HasItsWidthWithFreeTiming) {
   std::vector<std::string> any = bowden;
   any.push_back("timing.width_tolerance=0");
   const report::Report fast = compensated(walls(), any, output);
-  ASSERT_TRUE(even.laid_line && fast.laid_line);
-  EXPECT_GT(fast.laid_line->compensated.width.p99, 0.2);
-  EXPECT_LT(even.laid_line->compensated.width.p99, 0.1);
-  EXPECT_GT(even.emitted_time_s, fast.emitted_time_s);
+  ASSERT_TRUE(even.measured.uncompensated.line.is_known() &&
+              fast.measured.uncompensated.line.is_known());
+  EXPECT_GT(fast.measured.compensated.line.width.p99, 0.2);
+  EXPECT_LT(even.measured.compensated.line.width.p99, 0.1);
+  EXPECT_GT(even.measured.compensated.time_s, fast.measured.compensated.time_s);
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -125,23 +130,24 @@ TEST(LaidLineOf, AFileFollowsTheAdvanceThatItSets) {
   std::string output;
   const std::string print = "SET_PRESSURE_ADVANCE ADVANCE=0.05\n" + walls();
   const report::Report report = compensated(print, {"printer.firmware=klipper"}, output);
-  ASSERT_TRUE(report.laid_line);
+  ASSERT_TRUE(report.measured.uncompensated.line.is_known());
   EXPECT_GT(output.rfind("\nSET_PRESSURE_ADVANCE ADVANCE=0.05 SMOOTH_TIME=0.04\n"),
             output.rfind(";unflex end"));
-  EXPECT_LT(report.laid_line->compensated.width.rms, 0.05);
+  EXPECT_LT(report.measured.compensated.line.width.rms, 0.05);
 }
 
 TEST(LaidLineOf, APrinterWithoutAdvanceNeedsThatOfItsHotend) {
   std::string output;
   const report::Report nothing = compensated(walls(), {"printer.firmware=klipper"}, output);
-  EXPECT_FALSE(nothing.laid_line);
+  EXPECT_FALSE(nothing.measured.uncompensated.line.is_known());
   EXPECT_THAT(output, Not(HasSubstr("PRESSURE")));
   const report::Report known =
       compensated(walls(), {"printer.firmware=klipper", "pressure.advance_s=0.04"}, output);
-  ASSERT_TRUE(known.laid_line);
+  ASSERT_TRUE(known.measured.uncompensated.line.is_known());
   EXPECT_GT(output.rfind("\nSET_PRESSURE_ADVANCE ADVANCE=0 SMOOTH_TIME=0.04\n"),
             output.rfind(";unflex end"));
-  EXPECT_LT(known.laid_line->compensated.width.rms, 0.1 * known.laid_line->uncompensated.width.rms);
+  EXPECT_LT(known.measured.compensated.line.width.rms,
+            0.1 * known.measured.uncompensated.line.width.rms);
 }
 
 TEST(LaidLineOf, ABentPressureIsMadeUpForAsWell) {
@@ -154,8 +160,8 @@ TEST(LaidLineOf, ABentPressureIsMadeUpForAsWell) {
          "pressure.dead_time_ms=3", "extruder.instantaneous_corner_velocity_mm_s=5",
          "extruder.max_extrude_only_accel_mm_s2=10000"},
         output);
-    ASSERT_TRUE(report.laid_line) << shape;
-    EXPECT_LT(report.laid_line->compensated.width.rms, 0.03) << shape;
+    ASSERT_TRUE(report.measured.uncompensated.line.is_known()) << shape;
+    EXPECT_LT(report.measured.compensated.line.width.rms, 0.03) << shape;
   }
 }
 

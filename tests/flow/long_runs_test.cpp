@@ -40,9 +40,9 @@ TEST(LongRuns, AreLeftWhereTheyMeetAtTooManyLinesWithoutMotion) {
     const Result<report::Report> report = compensate(folder.job(workers), progress);
     ASSERT_TRUE(report.has_value()) << to_string(report.error());
     EXPECT_EQ(report->violation_count, 0U) << testing::complaints(*report);
-    EXPECT_EQ(report->runs_total, 3U);
-    EXPECT_EQ(report->runs_fallback, 2U) << testing::complaints(*report);
-    EXPECT_EQ(report->runs_compensated, 1U);
+    EXPECT_EQ(report->runs.total, 3U);
+    EXPECT_EQ(report->runs.fallback, 2U) << testing::complaints(*report);
+    EXPECT_EQ(report->runs.compensated, 1U);
     EXPECT_THAT(testing::complaints(*report), HasSubstr("too many lines without motion"));
     first = first.empty() ? folder.output() : first;
     EXPECT_EQ(folder.output(), first);
@@ -141,16 +141,17 @@ TEST_P(LongRunOn, IsCompensatedWithoutASeam) {
   const Result<report::Report> report = compensate(folder.job(2), progress);
   ASSERT_TRUE(report.has_value()) << to_string(report.error());
   EXPECT_EQ(report->violation_count, 0U) << testing::complaints(*report);
-  EXPECT_EQ(report->runs_total, 1U);
-  EXPECT_EQ(report->runs_fallback, 0U) << testing::complaints(*report);
+  EXPECT_EQ(report->runs.total, 1U);
+  EXPECT_EQ(report->runs.fallback, 0U) << testing::complaints(*report);
   EXPECT_TRUE(report->warnings.empty());
   const auto& before = testing::unshaped(*report).extruding;
-  const auto& after = report->compensated.extruding;
+  const auto& after = report->measured.compensated.extruding;
   EXPECT_LT(after.contour_rms_mm, 0.25 * before.contour_rms_mm);
   EXPECT_LT(after.contour_max_mm, before.contour_max_mm);
   // Klipper stops for 10.5 ms when its shaper is switched off, and again when it is switched on.
-  EXPECT_NEAR(report->emitted_time_s, report->reference_time_s, 0.03);
-  EXPECT_NEAR(report->output_extrusion_mm, report->input_extrusion_mm, 1e-5);
+  EXPECT_NEAR(report->measured.compensated.time_s, report->measured.uncompensated.time_s, 0.03);
+  EXPECT_NEAR(report->measured.compensated.extrusion_mm,
+              report->measured.uncompensated.extrusion_mm, 1e-5);
   // One run: its marks come once, and nothing is restored between its parts.
   const std::string output = folder.output();
   const auto count = [&](std::string_view what) {
@@ -195,7 +196,7 @@ TEST(LongRun, StandsAsAWholeWhenItsBeginningDoes) {
       compensate_with(folder.job(2), {factory(up_to(110.0)), nullptr}, progress);
   ASSERT_TRUE(report.has_value()) << to_string(report.error());
   EXPECT_EQ(report->violation_count, 0U) << testing::complaints(*report);
-  EXPECT_EQ(report->runs_fallback, 1U);
+  EXPECT_EQ(report->runs.fallback, 1U);
   EXPECT_THAT(folder.output(), HasSubstr(text.substr(text.find("F2400\n"))));
 }
 
@@ -207,10 +208,10 @@ TEST(LongRun, ThatCannotGoOnStandsAsAWhole) {
       compensate_with(folder.job(2), {factory(up_to(125.0)), nullptr}, progress);
   ASSERT_TRUE(report.has_value()) << to_string(report.error());
   EXPECT_EQ(report->violation_count, 0U) << testing::complaints(*report);
-  EXPECT_EQ(report->runs_total, 1U);
-  EXPECT_EQ(report->runs_fallback, 1U);
-  ASSERT_FALSE(report->fallbacks.empty());
-  EXPECT_THAT(report->fallbacks.front().reason, HasSubstr("too far out"));
+  EXPECT_EQ(report->runs.total, 1U);
+  EXPECT_EQ(report->runs.fallback, 1U);
+  ASSERT_FALSE(report->runs.fallbacks.empty());
+  EXPECT_THAT(report->runs.fallbacks.front().reason, HasSubstr("too far out"));
   EXPECT_THAT(folder.output(), HasSubstr(text.substr(text.find("F2400\n"))));
 }
 

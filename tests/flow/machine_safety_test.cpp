@@ -94,7 +94,7 @@ class Emitted : public ::testing::TestWithParam<Firmware> {
       const Result<report::Report> report = compensate(job, progress);
       EXPECT_TRUE(report) << to_string(report.error());
       EXPECT_EQ(report->violation_count, 0U) << testing::complaints(*report);
-      EXPECT_EQ(report->runs_fallback, 0U) << testing::complaints(*report);
+      EXPECT_EQ(report->runs.fallback, 0U) << testing::complaints(*report);
       lines = lines_of(folder.output());
     }
     return lines;

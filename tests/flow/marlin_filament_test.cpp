@@ -106,7 +106,7 @@ std::string compensated(const std::string& text) {
   SilentProgress progress;
   const Result<report::Report> made = compensate(folder.job(), progress);
   EXPECT_TRUE(made) << to_string(made.error());
-  EXPECT_TRUE(made && made->runs_compensated > 0U && made->runs_fallback == 0U);
+  EXPECT_TRUE(made && made->runs.compensated > 0U && made->runs.fallback == 0U);
   EXPECT_TRUE(made && made->violation_count == 0U) << testing::complaints(*made);
   return folder.output();
 }

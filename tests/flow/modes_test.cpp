@@ -54,8 +54,8 @@ TEST_P(Modes, AreCompensated) {
   ASSERT_TRUE(result) << to_string(result.error());
   const report::Report& made = *result;
   EXPECT_EQ(made.violation_count, 0U) << testing::complaints(made);
-  EXPECT_EQ(made.runs_fallback, 0U) << testing::complaints(made);
-  const double after_mm = made.compensated.extruding.contour_rms_mm;
+  EXPECT_EQ(made.runs.fallback, 0U) << testing::complaints(made);
+  const double after_mm = made.measured.compensated.extruding.contour_rms_mm;
   EXPECT_LE(1e3 * after_mm, one.most_um);
   EXPECT_GE(testing::unshaped(made).extruding.contour_rms_mm, 5.0 * after_mm);
 }
@@ -95,7 +95,7 @@ TEST(Plants, AreSuitedByTheBaseAndMeasured) {
   };
   const report::Report hardly = of_both(1e-6);
   const report::Report suited = of_both(0.3);
-  EXPECT_EQ(suited.runs_fallback, 0U) << testing::complaints(suited);
+  EXPECT_EQ(suited.runs.fallback, 0U) << testing::complaints(suited);
   ASSERT_EQ(suited.plants.size(), 2U);
   ASSERT_EQ(hardly.plants.size(), 2U);
   ASSERT_TRUE(suited.robustness.has_value());
@@ -103,8 +103,8 @@ TEST(Plants, AreSuitedByTheBaseAndMeasured) {
     return std::hypot(made.plants[0].compensated.rms_mm, made.plants[1].compensated.rms_mm);
   };
   EXPECT_LT(together_mm(suited), 0.85 * together_mm(hardly));
-  EXPECT_GT(suited.compensated.extruding.contour_rms_mm,
-            hardly.compensated.extruding.contour_rms_mm);
+  EXPECT_GT(suited.measured.compensated.extruding.contour_rms_mm,
+            hardly.measured.compensated.extruding.contour_rms_mm);
   // One axis alone may have plants.
   const report::Report of_y = made_for({"dynamics.y.plant=" + plants(0.3)});
   EXPECT_EQ(of_y.plants.size(), 2U);

@@ -44,7 +44,7 @@ report::Report compensated(const std::string& text, const std::string& kinematic
   Result<report::Report> report = compensate(folder.job(2), progress);
   EXPECT_TRUE(report.has_value()) << to_string(report.error());
   EXPECT_EQ(report->violation_count, 0U) << complaints(*report);
-  EXPECT_EQ(report->runs_fallback, 0U) << complaints(*report);
+  EXPECT_EQ(report->runs.fallback, 0U) << complaints(*report);
   return report.value_or(report::Report{});
 }
 
@@ -67,10 +67,10 @@ TEST_P(SharedMotorsOf, KeepTheirLimitsAtLittleCost) {
   const std::string text = beginning(tested.print, tested.lines);
   const report::Report shared = compensated(text, tested.kinematics, tested.overrides);
   const report::Report own = compensated(text, "cartesian", tested.overrides);
-  EXPECT_LE(shared.base_max_accel_mm_s2, (1.001 + tested.room) * kMaxAccel_mm_s2);
-  EXPECT_LE(shared.compensated.extruding.contour_rms_mm,
-            tested.cost * own.compensated.extruding.contour_rms_mm);
-  EXPECT_LT(shared.compensated.extruding.contour_rms_mm,
+  EXPECT_LE(shared.measured.base.max_accel_mm_s2, (1.001 + tested.room) * kMaxAccel_mm_s2);
+  EXPECT_LE(shared.measured.compensated.extruding.contour_rms_mm,
+            tested.cost * own.measured.compensated.extruding.contour_rms_mm);
+  EXPECT_LT(shared.measured.compensated.extruding.contour_rms_mm,
             0.2 * testing::unshaped(shared).extruding.contour_rms_mm);
 }
 

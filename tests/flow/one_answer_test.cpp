@@ -85,7 +85,7 @@ class OneAnswer : public ::testing::TestWithParam<Case> {
     SilentProgress progress;
     const Result<report::Report> report = compensate(folder.job(), progress);
     ASSERT_TRUE(report.has_value()) << to_string(report.error());
-    ASSERT_GT(report->runs_compensated, 0U) << testing::complaints(*report);
+    ASSERT_GT(report->runs.compensated, 0U) << testing::complaints(*report);
     text_ = report::to_text(*report);
     page_ = report::to_html(*report);
     json_ = json::parse(report::to_json(*report));

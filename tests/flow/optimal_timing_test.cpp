@@ -31,7 +31,7 @@ Compensated compensated(const std::string& print, std::vector<std::string> keys,
   SilentProgress progress;
   const Result<report::Report> report = compensate(folder.job(workers), progress);
   EXPECT_TRUE(report.has_value()) << to_string(report.error());
-  EXPECT_EQ(report->runs_total, report->runs_compensated) << complaints(*report);
+  EXPECT_EQ(report->runs.total, report->runs.compensated) << complaints(*report);
   EXPECT_TRUE(report->violations.empty()) << complaints(*report);
   return {*report, folder.output()};
 }
@@ -42,7 +42,7 @@ std::string tower() {
 }
 
 double largest_error_mm(const report::Report& report) {
-  return report.compensated.extruding.contour_max_mm;
+  return report.measured.compensated.extruding.contour_max_mm;
 }
 
 TEST(OptimalTiming, PrintsFasterThanAScaledOneAndKeepsTheTolerance) {
@@ -53,10 +53,10 @@ TEST(OptimalTiming, PrintsFasterThanAScaledOneAndKeepsTheTolerance) {
               "the scaled timing takes less time than the optimal one that was found");
   }
   EXPECT_EQ(optimal.free_timing.pieces_as_sliced, 0U);
-  EXPECT_LT(optimal.emitted_time_s, 0.98 * scaled.emitted_time_s);
-  EXPECT_LE(optimal.free_timing.contour_p999_mm, 1.05 * kTolerance_mm);
+  EXPECT_LT(optimal.measured.compensated.time_s, 0.98 * scaled.measured.compensated.time_s);
+  EXPECT_LE(optimal.measured.compensated.extruding.contour_p999_mm, 1.05 * kTolerance_mm);
   EXPECT_LE(largest_error_mm(optimal), 1.1 * kTolerance_mm);
-  EXPECT_LE(optimal.free_timing.speed_max, 1.02);
+  EXPECT_LE(optimal.measured.compensated_feed.max, 1.02);
 }
 
 TEST(OptimalTiming, IsTheSameForAnyNumberOfWorkers) {
@@ -88,9 +88,9 @@ TEST(OptimalTiming, GivesWayToAScaledOneWhereAxesHaveSeveralModes) {
 
 TEST(OptimalTiming, IsStretchedWhereALayerWouldBeTooShort) {
   // Two layers of 4.9 s as sliced.
-  const double free_s = compensated(tower(), {kKnown}).report.emitted_time_s;
+  const double free_s = compensated(tower(), {kKnown}).report.measured.compensated.time_s;
   const double long_s =
-      compensated(tower(), {kKnown, "timing.min_layer_s=4"}).report.emitted_time_s;
+      compensated(tower(), {kKnown, "timing.min_layer_s=4"}).report.measured.compensated.time_s;
   EXPECT_LT(free_s, 7.0);
   EXPECT_NEAR(long_s, 8.0, 0.4);
 }

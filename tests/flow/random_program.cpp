@@ -195,7 +195,7 @@ class Writer {
 
   std::string retraction() {
     if (pick(2) == 0) {
-      return state().retracted ? "G11\n" : "G10\n";
+      return state().retraction.retracted ? "G11\n" : "G10\n";
     }
     const double length = 0.8;
     add("G1" + word(E, state().position_mm[E] - length) + speed_word(35.0) + "\n");

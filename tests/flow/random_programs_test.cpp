@@ -122,9 +122,9 @@ void expect_faultless(Firmware firmware, unsigned seed, Counts& counts) {
   expect_same_end(text, output, firmware);
   EXPECT_EQ(unflex::testing::difference(text, output, unflex::testing::printer_with(job.settings)),
             "");
-  counts.runs += report->runs_total;
-  counts.kept += report->runs_fallback;
-  for (const report::Fallback& fallback : report->fallbacks) {
+  counts.runs += report->runs.total;
+  counts.kept += report->runs.fallback;
+  for (const report::Fallback& fallback : report->runs.fallbacks) {
     if (fallback.reason.starts_with("when it was verified")) {
       ++counts.blamed;
       std::cout << fmt::format("{} {}: {}\n", to_string(firmware), seed, fallback.reason);

@@ -212,8 +212,9 @@ class Restoration : public ::testing::TestWithParam<Printer> {
     ASSERT_TRUE(report) << to_string(report.error());
     EXPECT_EQ(report->violation_count, 0U) << testing::complaints(*report);
     // Some of such short runs are no better compensated, and are kept.
-    EXPECT_GE(2 * report->runs_compensated, report->runs_total) << testing::complaints(*report);
-    EXPECT_NEAR(report->output_extrusion_mm, report->input_extrusion_mm, 1e-3);
+    EXPECT_GE(2 * report->runs.compensated, report->runs.total) << testing::complaints(*report);
+    EXPECT_NEAR(report->measured.compensated.extrusion_mm,
+                report->measured.uncompensated.extrusion_mm, 1e-3);
     const Reader reader(printer.firmware, printer.own);
     const auto wanted = regimes(input, reader);
     const std::string output = folder.output();

@@ -71,18 +71,19 @@ void expect_robust(const std::string& text) {
   const report::Report robust = compensated(text, {"dynamics.freq_error=0.1"});
   EXPECT_LE(worst_rms_mm(robust, "unflex"), 0.8 * worst_rms_mm(nominal, "unflex"));
   EXPECT_LE(worst_rms_mm(robust, "unflex"), worst_rms_mm(robust, "ZV"));
-  EXPECT_GT(robust.compensated.extruding.contour_rms_mm,
-            nominal.compensated.extruding.contour_rms_mm)
+  EXPECT_GT(robust.measured.compensated.extruding.contour_rms_mm,
+            nominal.measured.compensated.extruding.contour_rms_mm)
       << "nothing is for nothing";
   EXPECT_EQ(robust.freq_error, 0.1);
   EXPECT_FALSE(nominal.robustness.has_value());
   ASSERT_TRUE(robust.robustness.has_value());
   // The cost of writing lines is small in comparison.
-  EXPECT_NEAR(robust.robustness->rms_mm, robust.compensated.extruding.contour_rms_mm,
+  EXPECT_NEAR(robust.robustness->rms_mm, robust.measured.compensated.extruding.contour_rms_mm,
               0.15 * robust.robustness->rms_mm);
-  EXPECT_LT(robust.robustness->nominal_rms_mm, nominal.compensated.extruding.contour_rms_mm);
+  EXPECT_LT(robust.robustness->nominal_rms_mm,
+            nominal.measured.compensated.extruding.contour_rms_mm);
   EXPECT_GT(robust.robustness->nominal_rms_mm, 0.0);
-  EXPECT_LT(robust.compensated.extruding.contour_rms_mm,
+  EXPECT_LT(robust.measured.compensated.extruding.contour_rms_mm,
             0.2 * testing::unshaped(robust).extruding.contour_rms_mm);
 }
 
@@ -104,7 +105,7 @@ TEST(Robustness, MayBeOfTheDampingToo) {
   std::ifstream print(std::filesystem::path(test_paths::kData) / "pipeline_wallring.gcode");
   const std::string text = fast_walls(print);
   const auto worst_mm = [&](const report::Report& report) {
-    return report.compensated.extruding.contour_rms_mm;
+    return report.measured.compensated.extruding.contour_rms_mm;
   };
   const report::Report band =
       compensated(text, {"dynamics.freq_error=0.05", "dynamics.damping_error=0.5"});
@@ -122,7 +123,7 @@ TEST(Robustness, IsReportedForEveryPrint) {
   for (std::size_t i = 0; i < errors.size(); ++i) {
     EXPECT_EQ(report.sensitivity[i].frequency_error, errors[i]);
     EXPECT_GT(report.sensitivity[i].compensated.rms_mm,
-              report.compensated.extruding.contour_rms_mm);
+              report.measured.compensated.extruding.contour_rms_mm);
   }
   // Verifying with the wrong frequency must give the reported value.
   const JobFolder folder(text, {"limits.max_accel_mm_s2=10000"});
@@ -134,8 +135,8 @@ TEST(Robustness, IsReportedForEveryPrint) {
   const Result<report::Report> verified = verify(job, progress);
   ASSERT_TRUE(verified.has_value());
   EXPECT_NEAR(report.sensitivity[4].compensated.rms_mm,
-              verified->compensated.extruding.contour_rms_mm,
-              0.01 * verified->compensated.extruding.contour_rms_mm);
+              verified->measured.compensated.extruding.contour_rms_mm,
+              0.01 * verified->measured.compensated.extruding.contour_rms_mm);
 }
 
 TEST(Robustness, IsComparedWithThePrintersOwnShaper) {

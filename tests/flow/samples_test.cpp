@@ -55,7 +55,7 @@ report::Report compensated(const Row& row, const std::string& freq_error) {
   Result<report::Report> report = compensate(folder.job(2), progress);
   EXPECT_TRUE(report.has_value()) << to_string(report.error());
   EXPECT_EQ(report->violation_count, 0U) << complaints(*report);
-  EXPECT_EQ(report->runs_fallback, 0U) << complaints(*report);
+  EXPECT_EQ(report->runs.fallback, 0U) << complaints(*report);
   return std::move(*report);
 }
 
@@ -75,17 +75,17 @@ TEST_P(TenLayers, AreDrawnAsTheReadmeSays) {
   ASSERT_EQ(told_um.size(), 8U);
   const std::array<std::pair<double, double>, 5> pairs = {
       {{told_um[0], testing::unshaped(robust).extruding.contour_rms_mm},
-       {told_um[1], robust.compensated.extruding.contour_rms_mm},
+       {told_um[1], robust.measured.compensated.extruding.contour_rms_mm},
        {told_um[2], worse_rms_mm(0.05)},
        {told_um[3], worse_rms_mm(0.10)},
-       {told_um[7], exact.compensated.extruding.contour_rms_mm}}};
+       {told_um[7], exact.measured.compensated.extruding.contour_rms_mm}}};
   for (const auto& [told, measured_mm] : pairs) {
     // As told with two or three digits, and as other compilers may differ in the last bits.
     EXPECT_NEAR(1e3 * measured_mm, told, 0.006 + 0.005 * told);
   }
   // "Print time grows by 0.05 to 0.32 %."
-  EXPECT_GT(robust.emitted_time_s, 1.0004 * robust.reference_time_s);
-  EXPECT_LT(robust.emitted_time_s, 1.00325 * robust.reference_time_s);
+  EXPECT_GT(robust.measured.compensated.time_s, 1.0004 * robust.measured.uncompensated.time_s);
+  EXPECT_LT(robust.measured.compensated.time_s, 1.00325 * robust.measured.uncompensated.time_s);
 }
 
 INSTANTIATE_TEST_SUITE_P(Readme, TenLayers,
@@ -165,17 +165,18 @@ TEST_P(OtherFirmware, DrawsPiecesOfPrints) {
                                         unflex::testing::printer_with(job.settings)),
             "");
   EXPECT_EQ(report->violation_count, 0U);
-  EXPECT_GT(report->runs_compensated, 0U);
-  EXPECT_LE(report->max_lines_per_s, GetParam().max_lines_per_s);
+  EXPECT_GT(report->runs.compensated, 0U);
+  EXPECT_LE(report->measured.output.max_lines_per_s, GetParam().max_lines_per_s);
   // Where M204 stands between lines, RepRapFirmware takes less time for the sliced file than a plan
   // in which limits hold from the next line on.
   const double most_longer = GetParam().firmware == "rrf" ? 1.015 : 1.01;
-  EXPECT_LE(report->emitted_time_s, most_longer * report->reference_time_s);
+  EXPECT_LE(report->measured.compensated.time_s,
+            most_longer * report->measured.uncompensated.time_s);
   // The emitted print may be a little shorter: a run's last line may end before the base would have
   // come to rest.
-  EXPECT_GE(report->emitted_time_s, 0.97 * report->reference_time_s);
+  EXPECT_GE(report->measured.compensated.time_s, 0.97 * report->measured.uncompensated.time_s);
   const double before = testing::unshaped(*report).extruding.contour_rms_mm;
-  const double after = report->compensated.extruding.contour_rms_mm;
+  const double after = report->measured.compensated.extruding.contour_rms_mm;
   EXPECT_LE(after, GetParam().rms_mm);
   EXPECT_LE(after, before / GetParam().improvement);
 }

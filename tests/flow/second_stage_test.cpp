@@ -29,7 +29,7 @@ report::Report made_of(const std::string& print, std::vector<std::string> overri
   Result<report::Report> result = compensate(folder.job(), progress);
   EXPECT_TRUE(result) << to_string(result.error());
   EXPECT_EQ(result->violation_count, 0U) << testing::complaints(*result);
-  EXPECT_EQ(result->runs_fallback, 0U) << testing::complaints(*result);
+  EXPECT_EQ(result->runs.fallback, 0U) << testing::complaints(*result);
   return std::move(*result);
 }
 
@@ -41,10 +41,10 @@ TEST(SecondStage, MakesUpForTheModeBehindTheFirst) {
   const auto um = [](double mm) { return 1e3 * mm; };
   EXPECT_NEAR(um(testing::unshaped(first).extruding.contour_max_mm), 57.9, 0.6);
   EXPECT_NEAR(um(testing::unshaped(first).extruding.contour_rms_mm), 16.7, 0.2);
-  EXPECT_NEAR(um(first.compensated.extruding.contour_max_mm), 8.95, 0.9);
-  EXPECT_NEAR(um(first.compensated.extruding.contour_rms_mm), 1.77, 0.18);
-  EXPECT_NEAR(um(both.compensated.extruding.contour_max_mm), 1.2, 0.3);
-  EXPECT_LT(um(both.compensated.extruding.contour_rms_mm), 0.15);
+  EXPECT_NEAR(um(first.measured.compensated.extruding.contour_max_mm), 8.95, 0.9);
+  EXPECT_NEAR(um(first.measured.compensated.extruding.contour_rms_mm), 1.77, 0.18);
+  EXPECT_NEAR(um(both.measured.compensated.extruding.contour_max_mm), 1.2, 0.3);
+  EXPECT_LT(um(both.measured.compensated.extruding.contour_rms_mm), 0.15);
 }
 
 TEST(SecondStage, HoldsOnEveryFirmwareAndOnMotorsThatAreShared) {
@@ -60,9 +60,9 @@ TEST(SecondStage, HoldsOnEveryFirmwareAndOnMotorsThatAreShared) {
     SCOPED_TRACE(printer);
     const report::Report first = made_of(print, {printer, "second.shaper=none"});
     const report::Report both = made_of(print, {printer});
-    EXPECT_LT(both.compensated.extruding.contour_rms_mm,
-              0.6 * first.compensated.extruding.contour_rms_mm);
-    EXPECT_LT(both.emitted_time_s, first.emitted_time_s + 0.1);
+    EXPECT_LT(both.measured.compensated.extruding.contour_rms_mm,
+              0.6 * first.measured.compensated.extruding.contour_rms_mm);
+    EXPECT_LT(both.measured.compensated.time_s, first.measured.compensated.time_s + 0.1);
   }
 }
 

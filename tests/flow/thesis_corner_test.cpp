@@ -34,16 +34,16 @@ report::Report report_of(const std::vector<std::string>& more = {}) {
   const Result<report::Report> report = compensate(folder.job(), progress);
   EXPECT_TRUE(report.has_value()) << to_string(report.error());
   EXPECT_EQ(report->violation_count, 0U) << complaints(*report);
-  EXPECT_EQ(report->runs_fallback, 0U) << complaints(*report);
+  EXPECT_EQ(report->runs.fallback, 0U) << complaints(*report);
   ::testing::Test::RecordProperty(
-      "rms_um", std::to_string(report->compensated.extruding.contour_rms_mm * 1e3));
+      "rms_um", std::to_string(report->measured.compensated.extruding.contour_rms_mm * 1e3));
   ::testing::Test::RecordProperty(
-      "max_um", std::to_string(report->compensated.extruding.contour_max_mm * 1e3));
+      "max_um", std::to_string(report->measured.compensated.extruding.contour_max_mm * 1e3));
   return *report;
 }
 
 TEST(ThesisCorner, IsMissedBy464MicrometresWithoutCompensation) {
-  const report::DeviationRow before = unshaped(report_of()).extruding;
+  const verify::DeviationStats before = unshaped(report_of()).extruding;
   EXPECT_NEAR(before.contour_max_mm, 0.464, 0.01 * 0.464);
   EXPECT_EQ(before.contour_max_line, 7U);
   EXPECT_NEAR(before.duration_s, 0.24, 1e-9);
@@ -51,7 +51,7 @@ TEST(ThesisCorner, IsMissedBy464MicrometresWithoutCompensation) {
 
 // The remaining error comes from the grid of 0.1 µm on which positions are written.
 TEST(ThesisCorner, IsDrawnWithin50NanometresByTheEmittedText) {
-  const report::DeviationRow after = report_of().compensated.extruding;
+  const verify::DeviationStats after = report_of().measured.compensated.extruding;
   EXPECT_LE(after.contour_rms_mm, 0.05e-3);
   EXPECT_LE(after.contour_max_mm, 0.6e-3);
 }

@@ -106,8 +106,8 @@ TEST(VerifyThread, FindsWhatVerifyingAfterwardsFinds) {
   const Result<verify::VerifyReport> result = thread.result();
   ASSERT_TRUE(result.has_value());
   EXPECT_EQ(result->violation_count, 0U);
-  EXPECT_EQ(result->output_lines, 6U);
-  EXPECT_GT(result->uncompensated.extruding.contour_max_mm, 0.01);
+  EXPECT_EQ(result->measured.output.lines, 6U);
+  EXPECT_GT(result->measured.uncompensated.extruding.contour_max_mm, 0.01);
 }
 
 TEST(VerifyThread, IsBehindUntilItHasReadWhatItWasGiven) {

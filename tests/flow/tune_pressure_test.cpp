@@ -132,9 +132,9 @@ TEST(TunePressure, BandsMakeOnePrintThatBreaksNoRule) {
     const Result<report::Report> report = testing::verify_joined(tower, *bands);
     ASSERT_TRUE(report) << to_string(report.error());
     EXPECT_EQ(report->violation_count, 0U) << testing::complaints(*report);
-    EXPECT_EQ(report->runs_fallback, 0U);
-    ASSERT_TRUE(report->laid_line);
-    EXPECT_LT(report->laid_line->compensated.width.rms, 0.05);
+    EXPECT_EQ(report->runs.fallback, 0U);
+    ASSERT_TRUE(report->measured.uncompensated.line.is_known());
+    EXPECT_LT(report->measured.compensated.line.width.rms, 0.05);
   }
 }
 

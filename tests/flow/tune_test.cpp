@@ -132,9 +132,9 @@ TEST(Tune, BandsMakeOnePrintThatBreaksNoRule) {
     ASSERT_TRUE(report) << to_string(report.error());
     EXPECT_EQ(report->violation_count, 0U) << testing::complaints(*report);
     // One run for each layer of the base, and one for each of the bands'.
-    EXPECT_EQ(report->runs_compensated, 4U + 3U * towers.layers_per_band);
-    EXPECT_LT(report->compensated.extruding.contour_rms_mm,
-              0.3 * report->uncompensated.extruding.contour_rms_mm);
+    EXPECT_EQ(report->runs.compensated, 4U + 3U * towers.layers_per_band);
+    EXPECT_LT(report->measured.compensated.extruding.contour_rms_mm,
+              0.3 * report->measured.uncompensated.extruding.contour_rms_mm);
   }
 }
 

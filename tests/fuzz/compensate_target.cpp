@@ -160,8 +160,8 @@ void check_end(const Playback& input, const Playback& output, const machine::Set
   const auto modes = [](const gcode::ModalState& state) {
     return fmt::format("G9{} M8{} unit {} M220 {} M221 {} retracted {} G{} shaper {} {}",
                        state.absolute_xyz ? 0 : 1, state.absolute_e ? 2 : 3, state.unit_mm,
-                       state.speed_factor, state.flow_factor, state.retracted, state.plane,
-                       state.shaper_freq_hz.x, state.shaper_freq_hz.y);
+                       state.speed_factor, state.flow_factor, state.retraction.retracted,
+                       state.plane, state.shaper.freq_hz.x, state.shaper.freq_hz.y);
   };
   require(modes(input.end) == modes(output.end),
           fmt::format("{} at the end instead of {}", modes(output.end), modes(input.end)));
@@ -173,7 +173,7 @@ void check_report(const report::Report& report) {
   require(report.violation_count == 0, fmt::format("{} violations: {}", report.violation_count,
                                                    fmt::join(report.violations, "; ")));
   // Two runs with only a rounding of filament between them are verified as one run.
-  require(report.runs_compensated + report.runs_fallback <= report.runs_total,
+  require(report.runs.compensated + report.runs.fallback <= report.runs.total,
           "more runs than there are");
   for (const std::string& warning : report.warnings) {
     require_one_line(warning);

@@ -126,7 +126,7 @@ TEST(FirmwareRetraction, HappensOnceAndStopsAnyhow) {
   Session session(retracting());
   EXPECT_EQ(session.read("G11").kind, EventKind::barrier) << "nothing to undo";
   EXPECT_EQ(session.read("G10").kind, EventKind::move);
-  EXPECT_TRUE(session.state().retracted);
+  EXPECT_TRUE(session.state().retraction.retracted);
   EXPECT_EQ(session.read("G10").kind, EventKind::barrier);
   EXPECT_EQ(session.read("G11").kind, EventKind::move);
   EXPECT_EQ(session.read("G11").kind, EventKind::barrier);
@@ -161,7 +161,7 @@ TEST(FirmwareRetraction, IsWrittenInKlippersDecimals) {
 TEST(FirmwareRetraction, IsWhatG10MeansWithWordsToo) {
   Session session(retracting());
   EXPECT_EQ(session.read("G10 S210 P0").kind, EventKind::move);
-  EXPECT_TRUE(session.state().retracted);
+  EXPECT_TRUE(session.state().retraction.retracted);
 }
 
 TEST(FirmwareRetraction, IsIgnoredWhereItIsNotConfigured) {
@@ -251,15 +251,15 @@ TEST(InputShaper, IsKeptForItsRestoration) {
   InterpreterOptions options;
   options.shaper_freq_hz.x = 45.0;
   Session session(options);
-  EXPECT_EQ(session.state().shaper, ShaperSettings{}) << "the configuration's";
+  EXPECT_EQ(session.state().shaper.settings, ShaperSettings{}) << "the configuration's";
   session.read("SET_INPUT_SHAPER SHAPER_FREQ_Y=38 SHAPER_TYPE=ei DAMPING_RATIO_X=0.08");
   session.read("SET_INPUT_SHAPER SHAPER_TYPE_Y=mzv");
-  EXPECT_EQ(session.state().shaper_freq_hz.x, 45.0);
-  EXPECT_EQ(session.state().shaper_freq_hz.y, 38.0);
-  EXPECT_EQ(session.state().shaper.type.x, "ei");
-  EXPECT_EQ(session.state().shaper.type.y, "mzv");
-  EXPECT_EQ(session.state().shaper.damping_ratio.x, 0.08);
-  EXPECT_EQ(session.state().shaper.damping_ratio.y, std::nullopt);
+  EXPECT_EQ(session.state().shaper.freq_hz.x, 45.0);
+  EXPECT_EQ(session.state().shaper.freq_hz.y, 38.0);
+  EXPECT_EQ(session.state().shaper.settings.type.x, "ei");
+  EXPECT_EQ(session.state().shaper.settings.type.y, "mzv");
+  EXPECT_EQ(session.state().shaper.settings.damping_ratio.x, 0.08);
+  EXPECT_EQ(session.state().shaper.settings.damping_ratio.y, std::nullopt);
 }
 
 }  // namespace

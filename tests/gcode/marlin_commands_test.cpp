@@ -181,22 +181,22 @@ TEST(MarlinShaper, IsKeptForItsRestoration) {
   options.shaper_freq_hz.x = 40.0;
   options.shaper_freq_hz.y = 35.0;
   Session session(options);
-  EXPECT_EQ(session.state().shaper_freq_hz.x, 40.0);
-  EXPECT_EQ(session.state().shaper.damping_ratio.x, std::nullopt);
+  EXPECT_EQ(session.state().shaper.freq_hz.x, 40.0);
+  EXPECT_EQ(session.state().shaper.settings.damping_ratio.x, std::nullopt);
   EXPECT_EQ(session.read("M593 X F50 D0.2").kind, EventKind::barrier);
-  EXPECT_EQ(session.state().shaper_freq_hz.x, 50.0);
-  EXPECT_EQ(session.state().shaper_freq_hz.y, 35.0);
-  EXPECT_EQ(session.state().shaper.damping_ratio.x, 0.2);
-  EXPECT_EQ(session.state().shaper.damping_ratio.y, std::nullopt);
+  EXPECT_EQ(session.state().shaper.freq_hz.x, 50.0);
+  EXPECT_EQ(session.state().shaper.freq_hz.y, 35.0);
+  EXPECT_EQ(session.state().shaper.settings.damping_ratio.x, 0.2);
+  EXPECT_EQ(session.state().shaper.settings.damping_ratio.y, std::nullopt);
   session.read("M593 F0");
-  EXPECT_EQ(session.state().shaper_freq_hz.x, 0.0);
-  EXPECT_EQ(session.state().shaper_freq_hz.y, 0.0);
-  EXPECT_EQ(session.state().shaper.damping_ratio.x, 0.2);
+  EXPECT_EQ(session.state().shaper.freq_hz.x, 0.0);
+  EXPECT_EQ(session.state().shaper.freq_hz.y, 0.0);
+  EXPECT_EQ(session.state().shaper.settings.damping_ratio.x, 0.2);
   session.read("M593 X Y F30");
-  EXPECT_EQ(session.state().shaper_freq_hz.x, 30.0);
-  EXPECT_EQ(session.state().shaper_freq_hz.y, 30.0);
+  EXPECT_EQ(session.state().shaper.freq_hz.x, 30.0);
+  EXPECT_EQ(session.state().shaper.freq_hz.y, 30.0);
   EXPECT_EQ(session.read("M593 D1.5").kind, EventKind::passive) << "out of range";
-  EXPECT_EQ(session.state().shaper.damping_ratio.x, 0.2);
+  EXPECT_EQ(session.state().shaper.settings.damping_ratio.x, 0.2);
 }
 
 TEST(MarlinSteps, AreRecordedAndSaidOnce) {

@@ -145,7 +145,7 @@ TEST(MarlinVolumes, AreCubicInchesInInches) {
 TEST(MarlinRetraction, IsUnknownToMostMarlins) {
   Session session = marlin();
   EXPECT_EQ(session.read("G10").kind, EventKind::passive);
-  EXPECT_FALSE(session.state().retracted);
+  EXPECT_FALSE(session.state().retraction.retracted);
 }
 
 // Fuzzing found this case.
@@ -175,7 +175,7 @@ TEST(MarlinRetraction, HopsAfterItAndComesDownBeforeTheNext) {
   ASSERT_THAT(up.segments, SizeIs(2));
   EXPECT_DOUBLE_EQ(up.segments[0].delta(E), -3.0);
   EXPECT_DOUBLE_EQ(up.segments[1].delta(Z), 0.4);
-  EXPECT_DOUBLE_EQ(session.state().hop_mm, 0.4);
+  EXPECT_DOUBLE_EQ(session.state().retraction.hop_mm, 0.4);
   EXPECT_DOUBLE_EQ(session.move("G1 X2 Z1").end_mm[Z], 1.4) << "Z reads as before";
   const Event down = session.read("G11");
   ASSERT_THAT(down.segments, SizeIs(2));

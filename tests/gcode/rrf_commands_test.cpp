@@ -254,30 +254,30 @@ TEST(RrfShaper, IsKeptForItsRestoration) {
   options.shaper_freq_hz.x = options.shaper_freq_hz.y = 40.0;
   options.shaper_type = "mzv";
   Session session(options);
-  EXPECT_EQ(session.state().shaper.type.x, "mzv");
+  EXPECT_EQ(session.state().shaper.settings.type.x, "mzv");
   session.read("M593 P\"none\"");
-  EXPECT_EQ(session.state().shaper_freq_hz.x, 0.0);
-  EXPECT_EQ(session.state().shaper.type.x, "none");
+  EXPECT_EQ(session.state().shaper.freq_hz.x, 0.0);
+  EXPECT_EQ(session.state().shaper.settings.type.x, "none");
   session.read("M593 P\"ZVDD\"");
-  EXPECT_EQ(session.state().shaper_freq_hz.x, 40.0) << "the frequency was kept";
-  EXPECT_EQ(session.state().shaper.type.y, "zvdd");
+  EXPECT_EQ(session.state().shaper.freq_hz.x, 40.0) << "the frequency was kept";
+  EXPECT_EQ(session.state().shaper.settings.type.y, "zvdd");
   session.read("M593 F50 S0.2");
-  EXPECT_EQ(session.state().shaper_freq_hz.y, 50.0);
-  EXPECT_EQ(session.state().shaper.damping_ratio.x, 0.2);
+  EXPECT_EQ(session.state().shaper.freq_hz.y, 50.0);
+  EXPECT_EQ(session.state().shaper.settings.damping_ratio.x, 0.2);
   EXPECT_EQ(session.read("M593 L0.3").kind, EventKind::barrier)
       << "it would switch on a shaper that is off within a run";
   session.read("M593 P\"custom\" H0.4:0.7 T0.01:0.01");
-  EXPECT_EQ(session.state().shaper.custom_words, "P\"custom\" H0.4:0.7 T0.01:0.01");
+  EXPECT_EQ(session.state().shaper.settings.custom_words, "P\"custom\" H0.4:0.7 T0.01:0.01");
 }
 
 TEST(RrfShaper, ThatIsOffTakesAFrequencyForZvd) {
   Session session(default_options(Firmware::rrf));
-  EXPECT_EQ(session.state().shaper_freq_hz.x, 0.0);
+  EXPECT_EQ(session.state().shaper.freq_hz.x, 0.0);
   session.read("M593 F35");
-  EXPECT_EQ(session.state().shaper_freq_hz.x, 35.0);
-  EXPECT_EQ(session.state().shaper.type.x, "zvd");
+  EXPECT_EQ(session.state().shaper.freq_hz.x, 35.0);
+  EXPECT_EQ(session.state().shaper.settings.type.x, "zvd");
   session.read("M593 P\"none\"\nM593 P\"mzv\"");
-  EXPECT_EQ(session.state().shaper_freq_hz.x, 35.0);
+  EXPECT_EQ(session.state().shaper.freq_hz.x, 35.0);
 }
 
 TEST(RrfJerk, IsTwoFrom3_6On) {

@@ -167,7 +167,7 @@ TEST(RrfRetraction, IsNotWhatG10ForAToolMeans) {
   Session session = rrf();
   session.read("G1 X1 Y1 Z1 E10");
   EXPECT_EQ(session.read("G10 P0 S210 R150").kind, EventKind::passive);
-  EXPECT_FALSE(session.state().retracted);
+  EXPECT_FALSE(session.state().retraction.retracted);
   EXPECT_EQ(session.read("M103").kind, EventKind::move) << "Simplify3D's retraction";
   EXPECT_EQ(session.read("M101").kind, EventKind::move);
 }

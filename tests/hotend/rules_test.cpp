@@ -53,13 +53,13 @@ TEST(Rules, ScaleWithTheUnitOfPower) {
   }
 }
 
-TEST(Rules, HaveNames) {
-  for (const Rule rule : {Rule::simc_pid, Rule::simc_pi, Rule::zn_pid, Rule::zn_pi,
-                          Rule::cohen_coon, Rule::tyreus_luyben}) {
-    EXPECT_EQ(rule_of(to_string(rule)), rule);
-  }
-  EXPECT_EQ(rule_of("simc"), kDefaultRule);
-  EXPECT_FALSE(rule_of("best"));
+TEST(Rules, HaveTheWordsOfTheCommandLine) {
+  EXPECT_EQ(to_string(Rule::simc_pid), "simc");
+  EXPECT_EQ(to_string(Rule::simc_pi), "simc-pi");
+  EXPECT_EQ(to_string(Rule::zn_pid), "zn");
+  EXPECT_EQ(to_string(Rule::zn_pi), "zn-pi");
+  EXPECT_EQ(to_string(Rule::cohen_coon), "cc");
+  EXPECT_EQ(to_string(Rule::tyreus_luyben), "tl");
 }
 
 }  // namespace

@@ -214,13 +214,13 @@ TEST_F(KlipperFiles, SayWhereTheSteppersOfCarriagesMayBe) {
 TEST_F(KlipperFiles, LeaveOpenWhatAMissingIncludeMaySay) {
   const std::string text = "[printer]\nkinematics: corexy\nmax_velocity: 200\nmax_accel: 1000\n";
   const Settings s = good(write("a.cfg", text + "[include shaper.cfg]\n"));
-  EXPECT_FALSE(s.printer.input_shaper_freq_hz.x);
-  EXPECT_FALSE(s.printer.input_shaper_freq_hz.y);
+  EXPECT_FALSE(s.printer.input_shaper.freq_hz.x);
+  EXPECT_FALSE(s.printer.input_shaper.freq_hz.y);
   EXPECT_THAT(told(s, "printer.firmware_retraction"), EndsWith("default"));
   ASSERT_THAT(s.guesses, SizeIs(1));
   EXPECT_THAT(s.guesses[0].message, ::testing::ContainsRegex("; it may be in .*/shaper.cfg \\("));
   const Settings whole = good(write("b.cfg", text));
-  EXPECT_EQ(whole.printer.input_shaper_freq_hz.x, 0.0);
+  EXPECT_EQ(whole.printer.input_shaper.freq_hz.x, 0.0);
   ASSERT_THAT(whole.guesses, SizeIs(1));
   EXPECT_THAT(whole.guesses[0].message, ::testing::Not(HasSubstr("it may be in")));
 }

@@ -376,8 +376,8 @@ TEST(ShaperDampingRatio, IsTheFirmwaresDefaultUnlessGiven) {
 }
 
 TEST(ShaperType, IsAWordInAFileAndInAnOverride) {
-  EXPECT_EQ(read("[printer]\ninput_shaper_type = \"mzv\"\n").printer.input_shaper_type.x, "mzv");
-  EXPECT_EQ(read("", {"printer.input_shaper_type=ei2"}).printer.input_shaper_type.x, "ei2");
+  EXPECT_EQ(read("[printer]\ninput_shaper_type = \"mzv\"\n").printer.input_shaper.type.x, "mzv");
+  EXPECT_EQ(read("", {"printer.input_shaper_type=ei2"}).printer.input_shaper.type.x, "ei2");
 }
 
 TEST(ShaperFrequency, OfZeroStaysZero) {

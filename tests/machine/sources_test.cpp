@@ -98,7 +98,7 @@ TEST(MarlinDump, WithoutEchoesIsKnownByItsWords) {
 
 TEST(MarlinDump, OfClassicJerkIsRead) {
   const Settings s = read("echo:  M92 X80 Y80\necho:  M205 B20000 S0 T0 X8.00 Y9.00 Z0.40 E5.00\n");
-  EXPECT_TRUE(s.printer.classic_jerk);
+  EXPECT_TRUE(s.printer.junctions.classic_jerk);
   EXPECT_EQ(s.jerk_mm_s(), (std::array{8.0, 9.0, 0.4, 5.0}));
   EXPECT_FALSE(s.printer.firmware_retraction);
 }
@@ -388,7 +388,7 @@ TEST(Slicers, TellAMarlinsLimits) {
   EXPECT_EQ(by_key(s)["limits.travel_accel_mm_s2"].origin, "default");
   EXPECT_EQ(told(s, "extruder.nozzle_diameter_mm"), "0.6 print.gcode:110");
   EXPECT_EQ(by_key(s)["printer.travel_x_mm"].origin, "default") << "a bed is not the travel";
-  EXPECT_FALSE(s.printer.classic_jerk);
+  EXPECT_FALSE(s.printer.junctions.classic_jerk);
 }
 
 TEST(Slicers, TellAKlippersLimitsAtTheHead) {

@@ -66,8 +66,8 @@ TEST(Recorder, ChangesNothingOfTheVerification) {
   const std::string output = verify::testing::PlainEmitter().emit(input);
   const verify::VerifyReport with = Recorded(input, output).verified;
   const verify::VerifyReport without = verified_alone(input, output);
-  for (const auto& [a, b] : {std::pair{with.uncompensated, without.uncompensated},
-                             std::pair{with.compensated, without.compensated}}) {
+  for (const auto& [a, b] : {std::pair{with.measured.uncompensated, without.measured.uncompensated},
+                             std::pair{with.measured.compensated, without.measured.compensated}}) {
     EXPECT_EQ(a.all.contour_max_mm, b.all.contour_max_mm);
     EXPECT_EQ(a.all.contour_rms_mm, b.all.contour_rms_mm);
     EXPECT_EQ(a.all.tracking_rms_mm, b.all.tracking_rms_mm);
@@ -77,9 +77,10 @@ TEST(Recorder, ChangesNothingOfTheVerification) {
     EXPECT_EQ(a.extruding.duration_s, b.extruding.duration_s);
   }
   EXPECT_EQ(with.violation_count, without.violation_count);
-  EXPECT_EQ(with.worst_move_extrusion_error_mm, without.worst_move_extrusion_error_mm);
-  EXPECT_EQ(with.worst_run_drift_s, without.worst_run_drift_s);
-  EXPECT_GT(with.uncompensated.extruding.contour_max_mm, 0.0);
+  EXPECT_EQ(with.measured.worst_move_extrusion_error_mm,
+            without.measured.worst_move_extrusion_error_mm);
+  EXPECT_EQ(with.measured.worst_run_drift_s, without.measured.worst_run_drift_s);
+  EXPECT_GT(with.measured.uncompensated.extruding.contour_max_mm, 0.0);
 }
 
 TEST(Recorder, LeavesOutWhatPrimesTheNozzle) {
@@ -109,8 +110,8 @@ TEST(Recorder, AgreesWithTheVerification) {
   const std::string input = print(4);
   const Recorded recorded(input, verify::testing::PlainEmitter().emit(input));
   const Recording& recording = recorded.recording;
-  const verify::DeviationStats& before = recorded.verified.uncompensated.extruding;
-  const verify::DeviationStats& after = recorded.verified.compensated.extruding;
+  const verify::DeviationStats& before = recorded.verified.measured.uncompensated.extruding;
+  const verify::DeviationStats& after = recorded.verified.measured.compensated.extruding;
 
   ASSERT_FALSE(recording.worst_before.empty());
   ASSERT_FALSE(recording.worst_after.empty());
@@ -243,7 +244,8 @@ TEST(Recorder, MeasuresOtherFrequenciesAndShapers) {
     ASSERT_THAT(contender.spreads, SizeIs(7)) << contender.name;
   }
   const std::vector<report::Spread>& plain = recording.contenders[0].spreads;
-  EXPECT_DOUBLE_EQ(plain[3].rms_mm, recorded.verified.uncompensated.extruding.contour_rms_mm);
+  EXPECT_DOUBLE_EQ(plain[3].rms_mm,
+                   recorded.verified.measured.uncompensated.extruding.contour_rms_mm);
   // A softer machine swings further.
   EXPECT_GT(plain[0].rms_mm, plain[3].rms_mm);
   EXPECT_GT(plain[3].rms_mm, plain[6].rms_mm);
@@ -252,8 +254,8 @@ TEST(Recorder, MeasuresOtherFrequenciesAndShapers) {
   EXPECT_LT(zv[3].rms_mm, 0.5 * plain[3].rms_mm);
   EXPECT_LT(zv[3].rms_mm, zv[0].rms_mm);
   EXPECT_LT(zv[3].rms_mm, zv[6].rms_mm);
-  EXPECT_NEAR(recording.shapers_measured_s, recorded.verified.uncompensated.extruding.duration_s,
-              0.1);
+  EXPECT_NEAR(recording.shapers_measured_s,
+              recorded.verified.measured.uncompensated.extruding.duration_s, 0.1);
 }
 
 TEST(Recorder, DrawsThePrintersOwnShaper) {

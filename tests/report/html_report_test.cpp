@@ -88,7 +88,7 @@ TEST(HtmlReport, SaysHowFarTheNozzlePassesFromCorners) {
   EXPECT_THAT(page, HasSubstr("Typical corner"));
   EXPECT_THAT(page, HasSubstr("60.0 → 0.50 µm RMS, 99 % within 110 → 2.50 µm, 120 → 15.0 µm at "
                               "most, as sliced in line 41, compensated in line 43"));
-  report.uncompensated_corners = report.compensated_corners = {};
+  report.measured.uncompensated.corners = report.measured.compensated.corners = {};
   EXPECT_THAT(to_html(report), Not(HasSubstr("Typical corner")));
 }
 
@@ -105,7 +105,7 @@ TEST(HtmlReport, SaysWhatTheHotendIsAskedFor) {
 TEST(HtmlReport, SaysWhetherTheFilamentComesFasterThanAsSliced) {
   Report report = recorded_report();
   EXPECT_THAT(to_html(report), HasSubstr("at most 12.5 % less than as sliced over 10 ms"));
-  report.flow_difference = std::nullopt;
+  report.measured.flow_difference = std::nullopt;
   EXPECT_THAT(to_html(report), Not(HasSubstr("Rate of filament")));
 }
 
@@ -141,9 +141,9 @@ TEST(HtmlReport, SaysWhenRulesAreBroken) {
 
 TEST(HtmlReport, DoesNotSpeakOfGainWhereThereIsNone) {
   Report report = recorded_report();
-  report.compensated = report.uncompensated;
-  report.compensated_corners = report.uncompensated_corners;
-  report.emitted_time_s = report.reference_time_s;
+  report.measured.compensated = report.measured.uncompensated;
+  report.measured.compensated.corners = report.measured.uncompensated.corners;
+  report.measured.compensated.time_s = report.measured.uncompensated.time_s;
   const std::string page = to_html(report);
   EXPECT_THAT(page, Not(HasSubstr("× less")));
   EXPECT_THAT(page, HasSubstr("as much as now"));
@@ -197,7 +197,7 @@ TEST(HtmlReport, LetsNoTextFromOutsideBecomeMarkup) {
   report.input = report.output = kHostile;
   report.warnings = {kHostile};
   report.violations = {kHostile};
-  report.fallbacks = {{1, 2, kHostile}};
+  report.runs.fallbacks = {{1, 2, kHostile}};
   report.kept_moves = {{kHostile, 1}};
   report.printer = {{kHostile, kHostile, kHostile}};
   report.recording->features[1].name = kHostile;
@@ -215,7 +215,7 @@ TEST(HtmlReport, BoundsItsLists) {
   Report report = recorded_report();
   report.warnings.assign(100'000, std::string(100, 'w'));
   report.violations.assign(1000, "v");
-  report.fallbacks.assign(1000, {1, 2, "f"});
+  report.runs.fallbacks.assign(1000, {1, 2, "f"});
   const std::string page = to_html(report);
   EXPECT_LT(page.size(), 200'000U);
   const nlohmann::json remarks = nlohmann::json::parse(element(page, "data"))["remarks"];

@@ -76,7 +76,7 @@ TEST(JsonReport, AnswersWhatTheSummaryAnswers) {
   EXPECT_NEAR(answers["safe"]["times_own_accel"].get<double>(), 19999.0 / 8000.0, 1e-12);
 
   // Without a shaper of its own the print is compared with ZV as well.
-  report.unshaped = std::nullopt;
+  report.measured.unshaped = std::nullopt;
   report.facts.shaper.clear();
   const nlohmann::json better = parsed(report)["answers"]["better"];
   EXPECT_EQ(better["now"], "without an input shaper");
@@ -133,7 +133,7 @@ TEST(JsonReport, SaysWhatTheHotendIsAskedFor) {
 
 TEST(JsonReport, HasNoDifferenceOfFlowsThatWereNotCompared) {
   Report report = sample_report();
-  report.flow_difference = std::nullopt;
+  report.measured.flow_difference = std::nullopt;
   const nlohmann::json flow = parsed(report)["flow"];
   EXPECT_TRUE(flow.at("largest_difference").is_null());
   EXPECT_TRUE(flow.at("largest_difference_line").is_null());
@@ -199,19 +199,19 @@ TEST(JsonReport, ListsUnknownCommandsAndWhatTheyCost) {
 
 TEST(JsonReport, SaysNothingOfTheWorkBehindAFileThatWasOnlyVerified) {
   Report verified = sample_report();
-  verified.solver_engine.clear();
+  verified.solver.engine.clear();
   const nlohmann::json json = parsed(verified);
   for (const char* const key : {"windows", "fallbacks", "kept_moves", "extruded_path",
                                 "unknown_commands", "line_budget", "solver"}) {
     EXPECT_TRUE(json[key].is_null()) << key;
   }
   EXPECT_TRUE(json["runs"]["total"].is_null());
-  EXPECT_EQ(json["runs"]["compensated"], verified.runs_compensated);
+  EXPECT_EQ(json["runs"]["compensated"], verified.runs.compensated);
 }
 
 TEST(JsonReport, HasEmptyListsRatherThanNone) {
   Report empty;
-  empty.solver_engine = "ipopt";
+  empty.solver.engine = "ipopt";
   const nlohmann::json json = parsed(empty);
   EXPECT_EQ(json["fallbacks"], nlohmann::json::array());
   EXPECT_EQ(json["violations"], nlohmann::json::array());
@@ -235,7 +235,7 @@ TEST(JsonReport, SurvivesQuotesAndControlCharacters) {
 
 TEST(JsonReport, WritesNullForWhatIsNotANumber) {
   Report report = sample_report();
-  report.print_s_per_wall_s = std::numeric_limits<double>::infinity();
+  report.performance.print_s_per_wall_s = std::numeric_limits<double>::infinity();
   EXPECT_TRUE(parsed(report)["performance"]["print_s_per_wall_s"].is_null());
 }
 

@@ -5,7 +5,7 @@
 
 namespace unflex::report {
 
-inline DeviationRow sample_row(double scale) {
+inline verify::DeviationStats sample_row(double scale) {
   return {.contour_max_mm = 1.0 * scale,
           .contour_p99_mm = 0.5 * scale,
           .contour_rms_mm = 0.25 * scale,
@@ -47,6 +47,7 @@ inline Recording sample_recording() {
 
 inline Report sample_report() {
   Report r;
+  verify::Measured& m = r.measured;
   r.command = "compensate";
   r.version = "0.1.0";
   r.input = "cube.gcode";
@@ -66,72 +67,77 @@ inline Report sample_report() {
              "X 0 to 250, Y 0 to 210 mm",
              "Klipper from its own storage",
              1000.0};
-  r.reference_time_s = 3600.0;
-  r.emitted_time_s = 3618.0;
-  r.uncompensated = {.extruding = sample_row(0.8), .all = sample_row(1.6)};
-  r.unshaped = {.extruding = sample_row(0.9), .all = sample_row(1.8)};
-  r.compensated = {.extruding = sample_row(0.0125), .all = sample_row(0.025)};
-  r.uncompensated_corners = {321, 0.06, 0.11, 0.12, 41};
-  r.compensated_corners = {321, 0.0005, 0.0025, 0.015, 43};
-  r.laid_line = {6800.0,
-                 {{0.06, 0.31, 0.7, 0.09, 812},
-                  {0.016, 0.08, 0.2, 813},
-                  {0.05, 0.2, 0.5, 0.07, 814},
-                  {0.09, 0.4, 0.8, 0.12, 815},
-                  {0.06, 0.31, 0.7, 0.09, 812},
-                  {0.07, 0.35, 0.75, 0.1, 816}},
-                 {{0.005, 0.021, -0.09, 0.001, 817},
-                  {0.002, 0.0066, 0.02, 818},
-                  {0.07, 0.3, -0.4, 0.08, 819},
-                  {0.055, 0.25, 0.3, 0.06, 820},
-                  {0.005, 0.021, -0.09, 0.001, 817},
-                  {0.04, 0.2, 0.25, 0.04, 821}}};
+  m.uncompensated.time_s = 3600.0;
+  m.compensated.time_s = 3618.0;
+  m.uncompensated.extruding = sample_row(0.8);
+  m.uncompensated.all = sample_row(1.6);
+  m.unshaped = {.extruding = sample_row(0.9), .all = sample_row(1.8)};
+  m.compensated.extruding = sample_row(0.0125);
+  m.compensated.all = sample_row(0.025);
+  m.uncompensated.corners = {321, 0.06, 0.11, 0.12, 41};
+  m.compensated.corners = {321, 0.0005, 0.0025, 0.015, 43};
+  m.uncompensated.line = {6800.0,
+                          {0.06, 0.31, 0.7, 0.09, 812},
+                          {0.016, 0.08, 0.2, 813},
+                          {},
+                          {},
+                          {{{0.05, 0.2, 0.5, 0.07, 814},
+                            {0.09, 0.4, 0.8, 0.12, 815},
+                            {0.06, 0.31, 0.7, 0.09, 812},
+                            {0.07, 0.35, 0.75, 0.1, 816}}}};
+  m.compensated.line = {6800.0,
+                        {0.005, 0.021, -0.09, 0.001, 817},
+                        {0.002, 0.0066, 0.02, 818},
+                        {},
+                        {},
+                        {{{0.07, 0.3, -0.4, 0.08, 819},
+                          {0.055, 0.25, 0.3, 0.06, 820},
+                          {0.005, 0.021, -0.09, 0.001, 817},
+                          {0.04, 0.2, 0.25, 0.04, 821}}}};
   r.freq_error = 0.1;
   r.sensitivity = {{-0.1, {0.9, 0.2}, {0.03, 0.012}}, {0.05, {0.7, 0.15}, {0.02, 0.0061}}};
   r.plants = {{{0.8, 0.18}, {0.02, 0.004}}, {{0.7, 0.15}, {0.03, 0.009}}};
   r.robustness = {0.003, 0.0005};
-  r.base_max_velocity_mm_s = 123.0;
-  r.base_max_accel_mm_s2 = 19999.0;
-  r.base_max_step_mm_s = 27.5;
-  r.base_accel_limit_mm_s2 = 20000.0;
-  r.runs_total = 900;
-  r.runs_compensated = 895;
-  r.runs_fallback = 5;
-  r.windows_total = 1000;
-  r.windows_solved = 994;
-  r.windows_fallback = 6;
+  m.base.max_velocity_mm_s = 123.0;
+  m.base.max_accel_mm_s2 = 19999.0;
+  m.base.max_step_mm_s = 27.5;
+  m.base.accel_limit_mm_s2 = 20000.0;
+  r.runs.total = 900;
+  r.runs.compensated = 895;
+  r.runs.fallback = 5;
+  r.runs.windows_total = 1000;
+  r.runs.windows_solved = 994;
+  r.runs.windows_fallback = 6;
   r.free_timing = {.tolerance_mm = 0.02,
                    .pieces_as_sliced = 1,
                    .as_sliced = {{50, 60, "base acceleration above the limit"}},
                    .pieces_scaled = 2,
                    .scaled = {{40, 49, "it is a part of a long motion"}},
-                   .narrower = report::NarrowerBand{0.05, 432.0},
-                   .contour_p999_mm = 0.0188,
-                   .speed_p999 = 1.012,
-                   .speed_max = 1.019,
-                   .speed_max_line = 77};
-  r.fallbacks = {{10, 20, "no solution"}, {30, 44, "worse than the original"}};
+                   .narrower = report::NarrowerBand{0.05, 432.0}};
+  m.compensated.extruding.contour_p999_mm = 0.0188;
+  m.compensated_feed = {1.012, 1.019, 77};
+  r.runs.fallbacks = {{10, 20, "no solution"}, {30, 44, "worse than the original"}};
   r.kept_moves = {{"Z move", 12}};
   r.extruded_path = {8000.0, 7000.0, {{"run left as sliced", 900.0}, {"start unknown", 100.0}}};
   r.unknown_commands = {{"M1234", 40, 12, 7, 100.0}, {"MY_MACRO", 1, 90, 0, 0.0}};
   r.line_budget = {850.0, 2, {{70, 75, 880.0}, {90, 91, 890.0}}, 0.0005, 0.0075};
-  r.solver_engine = "ipopt 3.11.9";
-  r.solver_iterations = 4242;
-  r.solver_check = {8, 3e-9, 2e-6};
-  r.output_lines = 123456;
-  r.output_bytes = 4500000;
-  r.max_lines_per_s = 890.0;
-  r.segment_ms_median = 2.5;
-  r.worst_run_drift_ms = 0.04;
-  r.input_extrusion_mm = 1234.5;
-  r.output_extrusion_mm = 1234.75;
-  r.worst_move_extrusion_error_mm = 0.00001;
-  r.uncompensated_lag = {0.06, 0.5, 700};
-  r.compensated_lag = {0.0045, 0.035, 801};
+  r.solver.engine = "ipopt 3.11.9";
+  r.solver.iterations = 4242;
+  r.solver.check = {8, 3e-9, 2e-6};
+  m.output.lines = 123456;
+  m.output.bytes = 4500000;
+  m.output.max_lines_per_s = 890.0;
+  m.output.segment_ms_median = 2.5;
+  m.worst_run_drift_s = 4e-5;
+  m.uncompensated.extrusion_mm = 1234.5;
+  m.compensated.extrusion_mm = 1234.75;
+  m.worst_move_extrusion_error_mm = 0.00001;
+  m.uncompensated.lag = {0.06, 0.5, 700};
+  m.compensated.lag = {0.0045, 0.035, 801};
   r.fitted_filament = {100.0, 110.5, 240.5, 1.1, 1.12, 108.5};
-  r.uncompensated_flow = {10.5, 710, 400.0, 711};
-  r.compensated_flow = {12.4, 811, 500.0, 812};
-  r.flow_difference = FlowDifferenceRow{-0.125, 813, 0.0625};
+  m.uncompensated.flow = {10.5, 710, 400.0, 711};
+  m.compensated.flow = {12.4, 811, 500.0, 812};
+  m.flow_difference = verify::FlowDifference{-0.125, 813, 0.0625};
   r.max_flow_mm3_s = 15.0;
   r.temperature = Temperature{5.0,
                               true,
@@ -142,10 +148,10 @@ inline Report sample_report() {
   r.step_rates = {{{"X", 80.0, 24000.0, 30, 31200.0, 812}, {"E", 500.0, 1250.0, 40, 1300.0, 0}},
                   {"", 0.0, 25000.0, 30, 32000.0, 812},
                   50000.0};
-  r.wall_s = 90.0;
-  r.cpu_s = 170.0;
-  r.print_s_per_wall_s = 40.0;
-  r.peak_rss_mb = 64.0;
+  r.performance.wall_s = 90.0;
+  r.performance.cpu_s = 170.0;
+  r.performance.print_s_per_wall_s = 40.0;
+  r.performance.peak_rss_mb = 64.0;
   r.violations = {"out.gcode:7: outside the travel"};
   r.violation_count = 3;
   r.warnings = {"cube.gcode:1: warning: no G28"};

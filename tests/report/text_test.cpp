@@ -102,7 +102,7 @@ TEST(Summary, IsExactlyThis) {
 
 TEST(Summary, TellsHowToKnowTheLineWhereItDoesNot) {
   Report report = sample_report();
-  report.laid_line.reset();
+  report.measured.uncompensated.line = {};
   const std::string text = to_text(report);
   EXPECT_THAT(text, HasSubstr("\nBetter?       200 → 3.12 µm RMS from the path: 64 times less than "
                               "now (under the printer's own input shaper, MZV 45 Hz)\n"
@@ -115,7 +115,7 @@ TEST(Summary, TellsHowToKnowTheLineWhereItDoesNot) {
 
 TEST(Summary, ComparesWithZvWhereThePrinterHasNoShaper) {
   Report report = sample_report();
-  report.unshaped = std::nullopt;
+  report.measured.unshaped = std::nullopt;
   report.facts.shaper.clear();
   report.violations.clear();
   report.violation_count = 0;
@@ -129,9 +129,9 @@ TEST(Summary, ComparesWithZvWhereThePrinterHasNoShaper) {
 TEST(Summary, SaysWhereThePrintIsWorseThanNow) {
   Report report = sample_report();
   report.free_timing = {};
-  report.compensated.extruding.contour_rms_mm = 0.5;
+  report.measured.compensated.extruding.contour_rms_mm = 0.5;
   EXPECT_THAT(to_text(report), HasSubstr("2.5 times MORE than now"));
-  report.compensated = report.uncompensated;
+  report.measured.compensated = report.measured.uncompensated;
   EXPECT_THAT(to_text(report), HasSubstr("as much as now"));
 }
 
@@ -140,7 +140,7 @@ TEST(Summary, SaysWhereCompensationIsHardlyWorthIt) {
   Report report = sample_report();
   report.free_timing.tolerance_mm = 0.0;
   EXPECT_THAT(to_text(report), ::testing::Not(HasSubstr("Hardly worth it")));
-  report.uncompensated.extruding.contour_p99_mm = 0.0079;
+  report.measured.uncompensated.extruding.contour_p99_mm = 0.0079;
   EXPECT_THAT(to_text(report), HasSubstr("Hardly worth it: as sliced 99 % of the time are within "
                                          "7.90 µm, and an eye sees 8\n"));
   EXPECT_THAT(to_html(report), HasSubstr("Hardly worth it"));
@@ -151,8 +151,8 @@ TEST(Summary, SaysWhereCompensationIsHardlyWorthIt) {
 
 TEST(Summary, SaysThatStrayingInTravelIsHarmless) {
   Report report = sample_report();
-  report.uncompensated.all.contour_max_mm = 0.02;
-  report.compensated.all.contour_max_mm = 0.15;
+  report.measured.uncompensated.all.contour_max_mm = 0.02;
+  report.measured.compensated.all.contour_max_mm = 0.15;
   EXPECT_THAT(to_text(report), HasSubstr("20.0 → 150"));
   EXPECT_THAT(to_text(report),
               HasSubstr("(in travel, where nothing is laid, straying is harmless)"));
@@ -160,17 +160,17 @@ TEST(Summary, SaysThatStrayingInTravelIsHarmless) {
 
 TEST(Summary, OfAFasterPrintBeginsWithItsTimeAndNamesNoLoss) {
   Report report = sample_report();
-  report.compensated.extruding.contour_rms_mm = 0.5;
+  report.measured.compensated.extruding.contour_rms_mm = 0.5;
   report.free_timing.tolerance_mm = 0.02;
-  report.free_timing.contour_p999_mm = 0.0195;
-  report.reference_time_s = 100.0;
-  report.emitted_time_s = 80.0;
+  report.measured.compensated.extruding.contour_p999_mm = 0.0195;
+  report.measured.uncompensated.time_s = 100.0;
+  report.measured.compensated.time_s = 80.0;
   report.free_timing.narrower = NarrowerBand{0.05, 1.0};  // too little to be told
   std::string text = to_text(report);
   EXPECT_THAT(text, HasSubstr("Faster?       1m 40s → 1m 20s to print, 20 % less; the nozzle may "
                               "stray 20 µm and keeps to it\nBetter?       "));
   EXPECT_THAT(text, ::testing::Not(HasSubstr("MORE than now")));
-  report.free_timing.contour_p999_mm = 0.03;
+  report.measured.compensated.extruding.contour_p999_mm = 0.03;
   EXPECT_THAT(to_text(report), HasSubstr("may stray 20 µm and strays further in places\n"));
 }
 
@@ -188,9 +188,9 @@ TEST(Summary, SaysWhereMotorsKeepThePrintersOwnLimits) {
 TEST(Summary, DoesNotSpeakOfRunsWhereNothingWasSolved) {
   Report report = sample_report();
   report.command = "verify";
-  report.runs_total = 0;
-  report.windows_total = 0;
-  report.solver_engine.clear();
+  report.runs.total = 0;
+  report.runs.windows_total = 0;
+  report.solver.engine.clear();
   EXPECT_THAT(to_text(report), Not(HasSubstr("solver")));
   EXPECT_THAT(to_text(report), Not(HasSubstr("per second in")));
 }
@@ -203,15 +203,15 @@ TEST(Summary, SpeaksOfNoBandWhereTheFrequenciesAreExact) {
 
 TEST(Summary, DoesNotSpeakOfCornersWhereThereAreNone) {
   Report report = sample_report();
-  report.uncompensated_corners = report.compensated_corners = {};
+  report.measured.uncompensated.corners = report.measured.compensated.corners = {};
   EXPECT_THAT(to_text(report), Not(HasSubstr("corners")));
 }
 
 TEST(Summary, SaysWhetherTheFilamentComesFasterThanAsSliced) {
   Report report = sample_report();
-  report.flow_difference->relative = 0.031;
+  report.measured.flow_difference->relative = 0.031;
   EXPECT_THAT(to_text(report), HasSubstr("at most 3.1 % more than as sliced over 10 ms, near "));
-  report.flow_difference = std::nullopt;
+  report.measured.flow_difference = std::nullopt;
   EXPECT_THAT(to_text(report), Not(HasSubstr("as sliced over")));
 }
 
@@ -219,7 +219,7 @@ TEST(Summary, SpeaksOfTheFlowOnlyWhereItRisesOrIsLimited) {
   Report report = sample_report();
   report.max_flow_mm3_s = std::nullopt;
   EXPECT_THAT(to_text(report), HasSubstr("flow          10.5 → 12.4 mm³/s at most\n"));
-  report.compensated_flow.max_mm3_s = 10.7;
+  report.measured.compensated.flow.max_mm3_s = 10.7;
   EXPECT_THAT(to_text(report), Not(HasSubstr("flow")));
   report.max_flow_mm3_s = 15.0;
   EXPECT_THAT(to_text(report),

@@ -71,7 +71,7 @@ TEST_P(OfAnyFirmware, NoHeightIsWrittenThatNobodyKnows) {
   SilentProgress progress;
   const auto report = compensate(folder.job(), progress);
   ASSERT_TRUE(report) << to_string(report.error());
-  ASSERT_EQ(report->runs_compensated, 2U);
+  ASSERT_EQ(report->runs.compensated, 2U);
   std::istringstream output(folder.output());
   bool behind_macro = false;
   std::size_t lines = 0;

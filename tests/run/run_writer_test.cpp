@@ -111,8 +111,8 @@ TEST_F(Writer, WritesARunAsCompensatedAndTheRestAsItIs) {
   EXPECT_THAT(run, Not(HasSubstr("G1 X80 E1\n")));
   EXPECT_THAT(written(*jobs[2]), HasSubstr("G4 P10\n"));
   static_cast<void>(writer_.finish());
-  EXPECT_EQ(report_.runs_compensated, 1U);
-  EXPECT_EQ(report_.runs_fallback, 0U);
+  EXPECT_EQ(report_.runs.compensated, 1U);
+  EXPECT_EQ(report_.runs.fallback, 0U);
   EXPECT_NEAR(report_.extruded_path.total_mm, 60.0, 1e-9);
   EXPECT_NEAR(report_.extruded_path.compensated_mm, 60.0, 1e-9);
   // The base's tail comes on top.
@@ -128,15 +128,15 @@ TEST_F(Writer, KeepsARunThatHasNoSolutionAndSaysWhy) {
   EXPECT_EQ(written(*jobs[0]), kHead);
   EXPECT_EQ(written(*jobs[1]), kCorner);
   EXPECT_EQ(written(*jobs[2]), "G4 P3000\n");
-  ASSERT_THAT(report_.fallbacks, SizeIs(1));
-  EXPECT_EQ(report_.fallbacks[0].reason, "no solution");
-  EXPECT_EQ(report_.fallbacks[0].first_line, 5U);
-  EXPECT_EQ(report_.fallbacks[0].last_line, 6U);
-  EXPECT_EQ(report_.runs_fallback, 1U);
+  ASSERT_THAT(report_.runs.fallbacks, SizeIs(1));
+  EXPECT_EQ(report_.runs.fallbacks[0].reason, "no solution");
+  EXPECT_EQ(report_.runs.fallbacks[0].first_line, 5U);
+  EXPECT_EQ(report_.runs.fallbacks[0].last_line, 6U);
+  EXPECT_EQ(report_.runs.fallback, 1U);
   EXPECT_EQ(writer_.time_factor(), 1.0);
   // The swing of the kept run is over after the pause, and the next run is compensated.
   EXPECT_THAT(written(*jobs[3]), HasSubstr(";unflex run\n")) << flow::testing::complaints(report_);
-  EXPECT_EQ(report_.runs_compensated, 1U);
+  EXPECT_EQ(report_.runs.compensated, 1U);
 }
 
 TEST_F(Writer, KeepsARunThatCompensationMakesWorse) {
@@ -149,8 +149,8 @@ TEST_F(Writer, KeepsARunThatCompensationMakesWorse) {
   job.plan = emit::plan_run(job.run(), job.piece.start, rules_.emit);
   static_cast<void>(written(*jobs[0]));
   EXPECT_EQ(written(job), kCorner);
-  ASSERT_THAT(report_.fallbacks, SizeIs(1));
-  EXPECT_THAT(report_.fallbacks[0].reason, Not(HasSubstr("no solution")));
+  ASSERT_THAT(report_.runs.fallbacks, SizeIs(1));
+  EXPECT_THAT(report_.runs.fallbacks[0].reason, Not(HasSubstr("no solution")));
 }
 
 TEST_F(Writer, PlansARunAgainForTheStateItFinds) {
@@ -176,8 +176,8 @@ TEST_F(SlowReader, GetsTheSlicedLinesWhereCompensatedOnesAreTooMany) {
   const auto jobs = jobs_of(kHead + kCorner);
   static_cast<void>(written(*jobs[0]));
   EXPECT_EQ(written(*jobs[1]), kCorner);
-  ASSERT_THAT(report_.fallbacks, SizeIs(1));
-  EXPECT_THAT(report_.fallbacks[0].reason, HasSubstr("lines"));
+  ASSERT_THAT(report_.runs.fallbacks, SizeIs(1));
+  EXPECT_THAT(report_.runs.fallbacks[0].reason, HasSubstr("lines"));
 }
 
 // Circles for more than a minute without a stop.
@@ -211,7 +211,7 @@ TEST_F(Writer, WritesTheBeginningOfALongRunThoughItIsALittleWorse) {
   ASSERT_THAT(report_.warnings, SizeIs(1));
   EXPECT_THAT(report_.warnings[0], HasSubstr("in a part of a long run, the nozzle strays more"));
   EXPECT_THAT(written(*jobs[2]), HasSubstr("G1 X"));
-  EXPECT_THAT(report_.fallbacks, SizeIs(0));
+  EXPECT_THAT(report_.runs.fallbacks, SizeIs(0));
 }
 
 TEST_F(Writer, EndsWithTheLinesOfAPartThatCannotBeWritten) {
@@ -241,9 +241,9 @@ TEST_F(Writer, KeepsAllPartsBehindABeginningThatIsKept) {
     text += written(*job);
   }
   EXPECT_EQ(text + writer_.finish(), kHead + long_run());
-  EXPECT_EQ(report_.runs_fallback, 1U);
-  EXPECT_THAT(report_.fallbacks, SizeIs(jobs.size() - 1));
-  EXPECT_EQ(report_.fallbacks[1].reason, "the run's beginning stands as it is");
+  EXPECT_EQ(report_.runs.fallback, 1U);
+  EXPECT_THAT(report_.runs.fallbacks, SizeIs(jobs.size() - 1));
+  EXPECT_EQ(report_.runs.fallbacks[1].reason, "the run's beginning stands as it is");
 }
 
 std::vector<Try> all(Tries tries) {

@@ -102,7 +102,7 @@ TEST_P(OfFirmware, ChangesAheadLeaveEveryOtherByteAndTheTime) {
     const Result<report::Report> after = compensated(early);
     ASSERT_TRUE(after) << to_string(after.error());
     EXPECT_THAT(testing::complaints(*after), IsEmpty());
-    EXPECT_EQ(after->emitted_time_s, before->emitted_time_s);
+    EXPECT_EQ(after->measured.compensated.time_s, before->measured.compensated.time_s);
     EXPECT_NE(early.output(), late.output());
     EXPECT_EQ(without_changes(early.output()), without_changes(late.output()));
     const report::Temperature& t = *after->temperature;
@@ -117,8 +117,8 @@ TEST_P(OfFirmware, ChangesAheadLeaveEveryOtherByteAndTheTime) {
     EXPECT_EQ(again->temperature->emitted.colder_s, t.emitted.colder_s);
     EXPECT_EQ(again->temperature->emitted.hotter_s, t.emitted.hotter_s);
     EXPECT_EQ(again->temperature->emitted.worst_line, t.emitted.worst_line);
-    EXPECT_EQ(again->compensated_flow.max_line, after->compensated_flow.max_line);
-    EXPECT_EQ(again->output_lines, after->output_lines);
+    EXPECT_EQ(again->measured.compensated.flow.max_line, after->measured.compensated.flow.max_line);
+    EXPECT_EQ(again->measured.output.lines, after->measured.output.lines);
   }
 }
 
@@ -139,7 +139,7 @@ TEST_P(OfFirmware, WaitsLessForWhatIsAskedAhead) {
   const Result<report::Report> again = verified(early);
   ASSERT_TRUE(again) << to_string(again.error());
   EXPECT_EQ(again->violation_count, 0U) << testing::complaints(*again);
-  EXPECT_EQ(again->output_lines, after->output_lines);
+  EXPECT_EQ(again->measured.output.lines, after->measured.output.lines);
 }
 
 INSTANTIATE_TEST_SUITE_P(Temperature, OfFirmware,

@@ -29,7 +29,7 @@ void expect_same_when_compensated(const std::string& gcode, Firmware firmware,
   SilentProgress progress;
   const Result<report::Report> report = flow::compensate(job, progress);
   ASSERT_TRUE(report.has_value()) << to_string(report.error());
-  EXPECT_GT(report->runs_compensated, 0U);
+  EXPECT_GT(report->runs.compensated, 0U);
   const std::string emitted = folder.output();
   EXPECT_GT(emitted.size(), times_longer * gcode.size());
   EXPECT_EQ(difference(sliced, emitted, printer_with(job.settings)), "");

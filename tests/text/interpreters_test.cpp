@@ -120,7 +120,7 @@ class Interpreters : public ::testing::TestWithParam<Firmware> {
     EXPECT_EQ(state.absolute_xyz, reading.absolute_xyz);
     EXPECT_EQ(state.e_is_absolute(), reading.absolute_e);
     EXPECT_EQ(state.unit_mm != 1.0, reading.inches);
-    EXPECT_EQ(state.retracted, reading.retracted);
+    EXPECT_EQ(state.retraction.retracted, reading.retracted);
   }
 
   gcode::Interpreter interpreter_{options()};

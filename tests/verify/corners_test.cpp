@@ -189,12 +189,13 @@ TEST(Corners, ThatTheNozzleStopsInCountToo) {
        {"", "G4 P500\n", "G1 E-2 F1800\nG1 E2\nG1 F3600\n", "M400\n", "G1 Z1\nG1 Z0.3\n"}) {
     const std::string text = there + stop + on;
     const VerifyReport report = verify_text(text, text, rules);
-    EXPECT_EQ(report.uncompensated_corners.count, 1U) << stop;
-    EXPECT_EQ(report.uncompensated_corners.max_line, 7U) << stop;
-    EXPECT_EQ(report.compensated_corners.count, 1U) << stop;
-    EXPECT_DOUBLE_EQ(report.compensated_corners.max_mm, report.uncompensated_corners.max_mm);
+    EXPECT_EQ(report.measured.uncompensated.corners.count, 1U) << stop;
+    EXPECT_EQ(report.measured.uncompensated.corners.max_line, 7U) << stop;
+    EXPECT_EQ(report.measured.compensated.corners.count, 1U) << stop;
+    EXPECT_DOUBLE_EQ(report.measured.compensated.corners.max_mm,
+                     report.measured.uncompensated.corners.max_mm);
     // A nozzle that rests at the corner does not cut it.
-    EXPECT_LT(report.uncompensated_corners.max_mm, stop.empty() ? 0.1 : 0.01) << stop;
+    EXPECT_LT(report.measured.uncompensated.corners.max_mm, stop.empty() ? 0.1 : 0.01) << stop;
   }
 }
 
@@ -215,9 +216,10 @@ TEST(Corners, AreTheSameInRunsThatAreDrawnInShortLines) {
   const VerifyReport report = verify_text(print, testing::PlainEmitter().emit(print));
   EXPECT_EQ(testing::violations_of(report), "");
   EXPECT_GT(report.runs, 1U);
-  EXPECT_EQ(report.uncompensated_corners.count, 4U);
-  EXPECT_EQ(report.compensated_corners.count, 4U);
-  EXPECT_NEAR(report.compensated_corners.rms_mm, report.uncompensated_corners.rms_mm, 0.01);
+  EXPECT_EQ(report.measured.uncompensated.corners.count, 4U);
+  EXPECT_EQ(report.measured.compensated.corners.count, 4U);
+  EXPECT_NEAR(report.measured.compensated.corners.rms_mm,
+              report.measured.uncompensated.corners.rms_mm, 0.01);
 }
 
 }  // namespace

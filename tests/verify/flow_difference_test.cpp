@@ -360,14 +360,14 @@ constexpr char kStart[] =
 
 TEST(FlowDifferenceOfFiles, IsNotKnownWhereNothingIsCompensated) {
   const std::string text = std::string(kStart) + "G1 X81 Y1 E4 F6000\n";
-  EXPECT_FALSE(testing::verify_text(text, text).flow_difference);
+  EXPECT_FALSE(testing::verify_text(text, text).measured.flow_difference);
 }
 
 TEST(FlowDifferenceOfFiles, IsNoneWhereThePlanIsDrawnFinely) {
   const std::string text = std::string(kStart) + "G1 X81 Y1 E4 F6000\nG1 X81 Y61 E3\n";
   const VerifyReport report = testing::verify_text(text, testing::PlainEmitter(1e-3).emit(text));
-  ASSERT_TRUE(report.flow_difference);
-  EXPECT_LT(std::abs(report.flow_difference->relative), 0.02);
+  ASSERT_TRUE(report.measured.flow_difference);
+  EXPECT_LT(std::abs(report.measured.flow_difference->relative), 0.02);
 }
 
 // The cruise's first half has 4 % more filament than it should, its second half lacks as much.
@@ -378,9 +378,9 @@ TEST(FlowDifferenceOfFiles, SaysWhereFilamentIsTooMuchAndByHowMuch) {
                        ";unflex run\nG1 X21 Y1 E1 F6000\nG1 X41 Y1 E1.04\nG1 X61 Y1 E.96\nG1 X81 "
                        "Y1 E1\n;unflex end\n";
   const VerifyReport report = testing::verify_text(text, output);
-  ASSERT_TRUE(report.flow_difference);
-  EXPECT_NEAR(report.flow_difference->relative, 0.04, 1e-6);
-  EXPECT_EQ(report.flow_difference->line, 8U);
+  ASSERT_TRUE(report.measured.flow_difference);
+  EXPECT_NEAR(report.measured.flow_difference->relative, 0.04, 1e-6);
+  EXPECT_EQ(report.measured.flow_difference->line, 8U);
 }
 
 TEST(FlowDifferenceOfFiles, IsNotKnownInFreeTiming) {
@@ -391,7 +391,7 @@ TEST(FlowDifferenceOfFiles, IsNotKnownInFreeTiming) {
   rules.tolerance_mm = 1.0;
   const VerifyReport report = testing::verify_text(text, output, rules);
   EXPECT_EQ(report.runs, 1U);
-  EXPECT_FALSE(report.flow_difference);
+  EXPECT_FALSE(report.measured.flow_difference);
 }
 
 // The filament of a run over time, and since when all moves have laid filament.
@@ -503,12 +503,12 @@ TEST_P(CutInShortLines, DiffersByWhatSamplesHave) {
   const std::string output = testing::PlainEmitter(7e-3).emit(text);
   const VerifyReport report = testing::verify_text(text, output);
   EXPECT_GT(report.runs, 1U);
-  ASSERT_TRUE(report.flow_difference);
+  ASSERT_TRUE(report.measured.flow_difference);
   const FlowDifference expected = sampled(text, output);
   EXPECT_GT(std::abs(expected.relative), 0.02);
-  EXPECT_NEAR(report.flow_difference->relative, expected.relative,
+  EXPECT_NEAR(report.measured.flow_difference->relative, expected.relative,
               0.01 * std::abs(expected.relative));
-  EXPECT_EQ(report.flow_difference->line, expected.line);
+  EXPECT_EQ(report.measured.flow_difference->line, expected.line);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, CutInShortLines, ::testing::Values("wallring", "star"),

@@ -189,7 +189,8 @@ constexpr char kWall[] = "G1 X81 Y1 E4 F6000\n";
 TEST(FlowOfFiles, IsThatOfTheirFilament) {
   const std::string text = std::string(kStart) + "SET_VELOCITY_LIMIT ACCEL=1000\nM400\n" + kWall;
   const VerifyReport report = testing::verify_text(text, text);
-  for (const FlowStats& flow : {report.uncompensated_flow, report.compensated_flow}) {
+  for (const FlowStats& flow :
+       {report.measured.uncompensated.flow, report.measured.compensated.flow}) {
     EXPECT_NEAR(flow.max_mm3_s, kFlow_mm3_s, 1e-6);
     EXPECT_EQ(flow.max_line, 7U);
     EXPECT_NEAR(flow.max_change_mm3_s2, kFlow_mm3_s / 0.1, 1e-3) << "in 0.1 s at full speed";
@@ -203,8 +204,9 @@ TEST(FlowOfFiles, HasItsRestsWhereTheMachineRests) {
     const std::string text = std::string(kStart) + "SET_VELOCITY_LIMIT ACCEL=10000000\nG1 X1.5 " +
                              burst + between + "G1 X2 " + burst;
     const VerifyReport report = testing::verify_text(text, text);
-    EXPECT_DOUBLE_EQ(report.uncompensated_flow.max_mm3_s, report.compensated_flow.max_mm3_s);
-    return report.compensated_flow.max_mm3_s;
+    EXPECT_DOUBLE_EQ(report.measured.uncompensated.flow.max_mm3_s,
+                     report.measured.compensated.flow.max_mm3_s);
+    return report.measured.compensated.flow.max_mm3_s;
   };
   EXPECT_NEAR(flow_mm3_s("M400\n"), 0.5 * kFlow_mm3_s, 1e-6);
   EXPECT_NEAR(flow_mm3_s("G4 P100\n"), 0.25 * kFlow_mm3_s, 1e-6);
@@ -214,10 +216,10 @@ TEST(FlowOfFiles, IsThatOfTheSlicedFileWhereItsPlanIsDrawnInShortLines) {
   const std::string text = std::string(kStart) + kWall + "G1 X81 Y61 E3\nG1 X1 Y61 E4\n";
   const VerifyReport report = testing::verify_text(text, testing::PlainEmitter(1e-3).emit(text));
   EXPECT_EQ(report.runs, 1U);
-  EXPECT_NEAR(report.compensated_flow.max_mm3_s, kFlow_mm3_s, 0.005 * kFlow_mm3_s);
-  EXPECT_NEAR(report.compensated_flow.max_change_mm3_s2,
-              report.uncompensated_flow.max_change_mm3_s2,
-              0.02 * report.uncompensated_flow.max_change_mm3_s2);
+  EXPECT_NEAR(report.measured.compensated.flow.max_mm3_s, kFlow_mm3_s, 0.005 * kFlow_mm3_s);
+  EXPECT_NEAR(report.measured.compensated.flow.max_change_mm3_s2,
+              report.measured.uncompensated.flow.max_change_mm3_s2,
+              0.02 * report.measured.uncompensated.flow.max_change_mm3_s2);
 }
 
 TEST(FlowOfFiles, IsTooMuchOnlyAboveTheLimitAndTheSlicedFile) {

@@ -80,14 +80,15 @@ TEST(Observation, IsToldEveryLineAndEveryStepOfEveryNozzle) {
   EXPECT_EQ(sums.lines.back(), 13U);
   EXPECT_NEAR(sums.held_s, 0.3, 1e-12);
   EXPECT_GT(sums.sections, 5U);
-  EXPECT_GT(sums.advanced_s, 0.9 * report.reference_time_s);
+  EXPECT_GT(sums.advanced_s, 0.9 * report.measured.uncompensated.time_s);
   ASSERT_EQ(sums.nozzles.size(), 6U);
   ASSERT_EQ(report.detuned.size(), 2U);
   for (const auto& [id, sum] : sums.nozzles) {
     const auto& [emitted, model] = id;
     const Deviation before =
-        model == 0 ? report.uncompensated : report.detuned[model - 1].uncompensated;
-    const Deviation after = model == 0 ? report.compensated : report.detuned[model - 1].compensated;
+        model == 0 ? report.measured.uncompensated : report.detuned[model - 1].uncompensated;
+    const Deviation after =
+        model == 0 ? report.measured.compensated : report.detuned[model - 1].compensated;
     const DeviationStats& stats = (emitted ? after : before).extruding;
     EXPECT_NEAR(sum.extruding_s, stats.duration_s, 1e-9);
     EXPECT_DOUBLE_EQ(std::sqrt(sum.most), stats.contour_max_mm);
@@ -107,11 +108,11 @@ TEST(Observation, OfTheSameNozzleIsTheSame) {
       EXPECT_NEAR(a.contour_rms_mm, b.contour_rms_mm, tolerance * b.contour_rms_mm);
     }
   };
-  expect_near(report.detuned[0].uncompensated, report.uncompensated, 0.0);
-  expect_near(report.detuned[0].compensated, report.compensated, 0.0);
+  expect_near(report.detuned[0].uncompensated, report.measured.uncompensated, 0.0);
+  expect_near(report.detuned[0].compensated, report.measured.compensated, 0.0);
   // Only a tenth of the steps are made, and a corner's largest deviation is a kink.
-  expect_near(report.detuned[1].uncompensated, report.uncompensated, 0.05);
-  expect_near(report.detuned[1].compensated, report.compensated, 0.05);
+  expect_near(report.detuned[1].uncompensated, report.measured.uncompensated, 0.05);
+  expect_near(report.detuned[1].compensated, report.measured.compensated, 0.05);
 }
 
 }  // namespace

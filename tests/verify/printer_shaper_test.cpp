@@ -136,11 +136,12 @@ TEST(PrinterShaper, AnIdenticalFileIsNeitherBetterNorWorse) {
     const VerifyReport report =
         verify_text(kCorners, kCorners, rules_with("mzv", freq_hz, "zv", freq_hz));
     EXPECT_EQ(violations_of(report), "");
-    expect_same(report.uncompensated.extruding, report.compensated.extruding);
-    expect_same(report.uncompensated.all, report.compensated.all);
-    EXPECT_DOUBLE_EQ(report.uncompensated_lag.max_mm, report.compensated_lag.max_mm);
-    EXPECT_DOUBLE_EQ(report.reference_time_s, report.emitted_time_s);
-    EXPECT_EQ(report.unshaped.has_value(), freq_hz > 0.0);
+    expect_same(report.measured.uncompensated.extruding, report.measured.compensated.extruding);
+    expect_same(report.measured.uncompensated.all, report.measured.compensated.all);
+    EXPECT_DOUBLE_EQ(report.measured.uncompensated.lag.max_mm,
+                     report.measured.compensated.lag.max_mm);
+    EXPECT_DOUBLE_EQ(report.measured.uncompensated.time_s, report.measured.compensated.time_s);
+    EXPECT_EQ(report.measured.unshaped.has_value(), freq_hz > 0.0);
   }
 }
 
@@ -149,15 +150,16 @@ TEST(PrinterShaper, AnIdenticalFileIsNeitherBetterNorWorse) {
 TEST(PrinterShaper, BeforeIsWhatThePrinterPlaysToday) {
   const VerifyReport plain = verify_text(kCorners, kCorners, rules_with("mzv", 0.0, "mzv", 0.0));
   const VerifyReport shaped = verify_text(kCorners, kCorners, rules_with("mzv", 45.0, "mzv", 45.0));
-  ASSERT_TRUE(shaped.unshaped.has_value());
-  expect_same(shaped.unshaped->extruding, plain.uncompensated.extruding);
-  expect_same(shaped.unshaped->all, plain.uncompensated.all);
-  EXPECT_LT(shaped.uncompensated.extruding.contour_rms_mm,
-            0.8 * plain.uncompensated.extruding.contour_rms_mm);
-  EXPECT_NEAR(shaped.uncompensated.extruding.duration_s, plain.uncompensated.extruding.duration_s,
-              1e-9);
-  EXPECT_NEAR(shaped.uncompensated.all.duration_s, plain.uncompensated.all.duration_s, 1e-9);
-  EXPECT_DOUBLE_EQ(shaped.reference_time_s, plain.reference_time_s);
+  ASSERT_TRUE(shaped.measured.unshaped.has_value());
+  expect_same(shaped.measured.unshaped->extruding, plain.measured.uncompensated.extruding);
+  expect_same(shaped.measured.unshaped->all, plain.measured.uncompensated.all);
+  EXPECT_LT(shaped.measured.uncompensated.extruding.contour_rms_mm,
+            0.8 * plain.measured.uncompensated.extruding.contour_rms_mm);
+  EXPECT_NEAR(shaped.measured.uncompensated.extruding.duration_s,
+              plain.measured.uncompensated.extruding.duration_s, 1e-9);
+  EXPECT_NEAR(shaped.measured.uncompensated.all.duration_s,
+              plain.measured.uncompensated.all.duration_s, 1e-9);
+  EXPECT_DOUBLE_EQ(shaped.measured.uncompensated.time_s, plain.measured.uncompensated.time_s);
 }
 
 // The sliced file may have its own shaper; it acts from there on.
@@ -165,10 +167,10 @@ TEST(PrinterShaper, OfTheSlicedFileActsFromItsLineOn) {
   std::string set = kDiagonal;
   set += "SET_INPUT_SHAPER SHAPER_FREQ_X=45 SHAPER_FREQ_Y=45\nG1 X20 Y220 E10\nG1 X20 Y20 E10\n";
   const VerifyReport report = verify_text(set, set, rules_with("mzv", 0.0, "mzv", 0.0));
-  ASSERT_TRUE(report.unshaped.has_value());
-  EXPECT_LT(report.uncompensated.extruding.contour_rms_mm,
-            report.unshaped->extruding.contour_rms_mm);
-  expect_same(report.uncompensated.extruding, report.compensated.extruding);
+  ASSERT_TRUE(report.measured.unshaped.has_value());
+  EXPECT_LT(report.measured.uncompensated.extruding.contour_rms_mm,
+            report.measured.unshaped->extruding.contour_rms_mm);
+  expect_same(report.measured.uncompensated.extruding, report.measured.compensated.extruding);
 }
 
 // A macro may change pressure advance, but the last value known is the best guess: a switch takes
@@ -177,7 +179,8 @@ TEST(PrinterShaper, SwitchesAsSlowlyBehindAMacroAsBefore) {
   const auto switched_s = [](const std::string& between) {
     const std::string text = "G28\nG90\nM83\nG1 Z1 F600\nG1 X20 Y20 F6000\n" + between +
                              "SET_INPUT_SHAPER SHAPER_FREQ_X=0 SHAPER_FREQ_Y=0\nG1 E1 F600\n";
-    return verify_text(text, text, rules_with("mzv", 100.0, "mzv", 100.0)).emitted_time_s;
+    return verify_text(text, text, rules_with("mzv", 100.0, "mzv", 100.0))
+        .measured.compensated.time_s;
   };
   const double without_s = switched_s("MY_MACRO\n");
   const double with_s = switched_s("SET_PRESSURE_ADVANCE ADVANCE=0.05\n");

@@ -24,14 +24,14 @@ void expect_faultless(const std::string& text) {
   const auto report = verify(input, "in.gcode", output, "out.gcode", rules, progress);
   ASSERT_TRUE(report.has_value());
   EXPECT_EQ(testing::violations_of(*report), "");
-  EXPECT_EQ(report->output_bytes, text.size());
-  EXPECT_NEAR(report->reference_time_s, report->emitted_time_s, 1e-9);
-  EXPECT_LT(report->worst_move_extrusion_error_mm, 1e-9);
-  EXPECT_GT(report->uncompensated.extruding.contour_rms_mm, 1e-3);
-  const double rms = report->uncompensated.extruding.contour_rms_mm;
-  EXPECT_NEAR(report->compensated.extruding.contour_rms_mm, rms, 1e-9 * rms);
-  EXPECT_NEAR(report->compensated.all.contour_max_mm, report->uncompensated.all.contour_max_mm,
-              1e-9);
+  EXPECT_EQ(report->measured.output.bytes, text.size());
+  EXPECT_NEAR(report->measured.uncompensated.time_s, report->measured.compensated.time_s, 1e-9);
+  EXPECT_LT(report->measured.worst_move_extrusion_error_mm, 1e-9);
+  EXPECT_GT(report->measured.uncompensated.extruding.contour_rms_mm, 1e-3);
+  const double rms = report->measured.uncompensated.extruding.contour_rms_mm;
+  EXPECT_NEAR(report->measured.compensated.extruding.contour_rms_mm, rms, 1e-9 * rms);
+  EXPECT_NEAR(report->measured.compensated.all.contour_max_mm,
+              report->measured.uncompensated.all.contour_max_mm, 1e-9);
 }
 
 class Cut : public ::testing::TestWithParam<std::string> {};

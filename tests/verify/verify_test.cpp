@@ -91,31 +91,33 @@ TEST(Verify, AFileIsItsOwnFaultlessOutput) {
   EXPECT_EQ(violations_of(report), "");
   EXPECT_EQ(report.violation_count, 0U);
   EXPECT_EQ(report.runs, 0U);
-  EXPECT_EQ(report.output_lines, 31U);
-  EXPECT_EQ(report.output_bytes, std::string(kPrint).size());
-  EXPECT_DOUBLE_EQ(report.reference_time_s, report.emitted_time_s);
-  EXPECT_NEAR(report.input_extrusion_mm, 1.2 + 0.9 + 1.2 + 0.88 - 0.4 - 1.6 + 2 + 2 + 1.43, 1e-9);
-  EXPECT_DOUBLE_EQ(report.input_extrusion_mm, report.output_extrusion_mm);
-  EXPECT_LT(report.worst_move_extrusion_error_mm, 1e-12);
-  EXPECT_EQ(report.base_max_accel_mm_s2, 0.0);
-  EXPECT_GT(report.uncompensated.extruding.contour_max_mm, 0.01);
-  EXPECT_DOUBLE_EQ(report.uncompensated.extruding.contour_rms_mm,
-                   report.compensated.extruding.contour_rms_mm);
-  EXPECT_DOUBLE_EQ(report.uncompensated.all.tracking_max_mm,
-                   report.compensated.all.tracking_max_mm);
+  EXPECT_EQ(report.measured.output.lines, 31U);
+  EXPECT_EQ(report.measured.output.bytes, std::string(kPrint).size());
+  EXPECT_DOUBLE_EQ(report.measured.uncompensated.time_s, report.measured.compensated.time_s);
+  EXPECT_NEAR(report.measured.uncompensated.extrusion_mm,
+              1.2 + 0.9 + 1.2 + 0.88 - 0.4 - 1.6 + 2 + 2 + 1.43, 1e-9);
+  EXPECT_DOUBLE_EQ(report.measured.uncompensated.extrusion_mm,
+                   report.measured.compensated.extrusion_mm);
+  EXPECT_LT(report.measured.worst_move_extrusion_error_mm, 1e-12);
+  EXPECT_EQ(report.measured.base.max_accel_mm_s2, 0.0);
+  EXPECT_GT(report.measured.uncompensated.extruding.contour_max_mm, 0.01);
+  EXPECT_DOUBLE_EQ(report.measured.uncompensated.extruding.contour_rms_mm,
+                   report.measured.compensated.extruding.contour_rms_mm);
+  EXPECT_DOUBLE_EQ(report.measured.uncompensated.all.tracking_max_mm,
+                   report.measured.compensated.all.tracking_max_mm);
 }
 
 TEST(Verify, OfEmptyFilesFindsNothing) {
   const VerifyReport report = verify_text("", "");
   EXPECT_EQ(report.violation_count, 0U);
-  EXPECT_EQ(report.reference_time_s, 0.0);
-  EXPECT_EQ(report.output_lines, 0U);
+  EXPECT_EQ(report.measured.uncompensated.time_s, 0.0);
+  EXPECT_EQ(report.measured.output.lines, 0U);
 }
 
 TEST(Verify, CountsDwellsInThePrintTime) {
   const VerifyReport with = verify_text("G4 P1500\n", "G4 P1500\n");
-  EXPECT_NEAR(with.reference_time_s, 1.5, 1e-12);
-  EXPECT_NEAR(with.emitted_time_s, 1.5, 1e-12);
+  EXPECT_NEAR(with.measured.uncompensated.time_s, 1.5, 1e-12);
+  EXPECT_NEAR(with.measured.compensated.time_s, 1.5, 1e-12);
 }
 
 TEST(Verify, CountsSwitchesOfFiltersInThePrintTime) {
@@ -123,7 +125,7 @@ TEST(Verify, CountsSwitchesOfFiltersInThePrintTime) {
   const std::string back = "G1 X10 E1\n";
   const auto takes_s = [&](const std::string& switches, const std::string& after) {
     return verify_text(there + switches + back + after, there + switches + back + after)
-        .emitted_time_s;
+        .measured.compensated.time_s;
   };
   const double plain_s = takes_s("G4 P0\n", "");
   const std::string on = "SET_PRESSURE_ADVANCE ADVANCE=0.05\n";
@@ -139,7 +141,7 @@ TEST(Verify, TheDeviationOfAFileIsThatOfItsPlan) {
   const auto moves = testing::plan_path(
       {{1.0, 1.0, 0.0}, {40.0, 1.0, 100.0, 1.0}, {40.0, 40.0, 100.0, 1.0}}, planner::Limits{});
   const DeviationStats alone = measure(moves, moves, testing::at_rest(moves), {}).extruding.stats();
-  const DeviationStats in_file = verify_text(text, text).uncompensated.extruding;
+  const DeviationStats in_file = verify_text(text, text).measured.uncompensated.extruding;
   // The swing after the positioning has died down by e^{-51} in three seconds.
   EXPECT_NEAR(in_file.contour_max_mm, alone.contour_max_mm, 1e-9);
   EXPECT_NEAR(in_file.contour_rms_mm, alone.contour_rms_mm, 1e-9);
@@ -155,10 +157,12 @@ TEST(Verify, HoldsTheBaseAfterTheEnd) {
   const VerifyReport without = verify_text(text, text, rules);
   rules.nozzle.hold_s = 0.75;
   const VerifyReport with = verify_text(text, text, rules);
-  EXPECT_NEAR(with.uncompensated.all.duration_s, without.uncompensated.all.duration_s + 0.75, 1e-9);
-  EXPECT_DOUBLE_EQ(with.reference_time_s, without.reference_time_s);
+  EXPECT_NEAR(with.measured.uncompensated.all.duration_s,
+              without.measured.uncompensated.all.duration_s + 0.75, 1e-9);
+  EXPECT_DOUBLE_EQ(with.measured.uncompensated.time_s, without.measured.uncompensated.time_s);
   // Braking takes less than a quarter of a period, so the nozzle swings furthest afterwards.
-  EXPECT_GT(with.uncompensated.all.contour_max_mm, 1.2 * without.uncompensated.all.contour_max_mm);
+  EXPECT_GT(with.measured.uncompensated.all.contour_max_mm,
+            1.2 * without.measured.uncompensated.all.contour_max_mm);
 }
 
 // ---- a run drawn in short lines ----------------------------------------------------------------
@@ -167,26 +171,30 @@ TEST_F(Emitted, AFaithfulCopyInShortLinesIsFaultless) {
   const VerifyReport report = check(good_);
   EXPECT_EQ(violations_of(report), "") << good_;
   EXPECT_EQ(report.runs, 3U);
-  EXPECT_NEAR(report.emitted_time_s, report.reference_time_s, 0.01 * report.reference_time_s);
-  EXPECT_NEAR(report.input_extrusion_mm, report.output_extrusion_mm, 1e-9);
-  EXPECT_LT(report.worst_move_extrusion_error_mm, 1.1e-5);
-  EXPECT_NEAR(report.segment_ms_median, 2.0, 0.05);
-  EXPECT_GE(report.max_lines_per_s, 480.0);
-  EXPECT_LE(report.max_lines_per_s, 520.0);
+  EXPECT_NEAR(report.measured.compensated.time_s, report.measured.uncompensated.time_s,
+              0.01 * report.measured.uncompensated.time_s);
+  EXPECT_NEAR(report.measured.uncompensated.extrusion_mm, report.measured.compensated.extrusion_mm,
+              1e-9);
+  EXPECT_LT(report.measured.worst_move_extrusion_error_mm, 1.1e-5);
+  EXPECT_NEAR(report.measured.output.segment_ms_median, 2.0, 0.05);
+  EXPECT_GE(report.measured.output.max_lines_per_s, 480.0);
+  EXPECT_LE(report.measured.output.max_lines_per_s, 520.0);
   // The travel to X30 Y30 peaks at v² = aL(1 − minimum cruise ratio).
   const double travel_mm = std::hypot(8.0, 9.5);
-  EXPECT_NEAR(report.base_max_velocity_mm_s, std::sqrt(1000.0 * travel_mm) * 9.5 / travel_mm, 1.0);
-  EXPECT_GT(report.base_max_accel_mm_s2, 1900.0);
-  EXPECT_LT(report.base_max_accel_mm_s2, 8000.0);
-  EXPECT_LT(report.worst_run_drift_s, 5e-4);
+  EXPECT_NEAR(report.measured.base.max_velocity_mm_s,
+              std::sqrt(1000.0 * travel_mm) * 9.5 / travel_mm, 1.0);
+  EXPECT_GT(report.measured.base.max_accel_mm_s2, 1900.0);
+  EXPECT_LT(report.measured.base.max_accel_mm_s2, 8000.0);
+  EXPECT_LT(report.measured.worst_run_drift_s, 5e-4);
   // The copy does not compensate, so it deviates as before.
-  EXPECT_NEAR(report.compensated.extruding.contour_rms_mm,
-              report.uncompensated.extruding.contour_rms_mm,
-              0.05 * report.uncompensated.extruding.contour_rms_mm);
+  EXPECT_NEAR(report.measured.compensated.extruding.contour_rms_mm,
+              report.measured.uncompensated.extruding.contour_rms_mm,
+              0.05 * report.measured.uncompensated.extruding.contour_rms_mm);
   // The sliced file passes through a corner into its wipe. The emitted file rests there.
-  EXPECT_GT(report.compensated.extruding.duration_s, report.uncompensated.extruding.duration_s);
-  EXPECT_LT(report.compensated.extruding.duration_s,
-            report.uncompensated.extruding.duration_s + 0.01);
+  EXPECT_GT(report.measured.compensated.extruding.duration_s,
+            report.measured.uncompensated.extruding.duration_s);
+  EXPECT_LT(report.measured.compensated.extruding.duration_s,
+            report.measured.uncompensated.extruding.duration_s + 0.01);
 }
 
 TEST_F(Emitted, ALostLineIsFound) {
@@ -257,7 +265,7 @@ TEST_F(Emitted, FilamentLaidElsewhereIsReported) {
   const double filament = std::stod(heap.substr(e));
   heap.replace(e, heap.find(' ', e) - e, fmt::format("{:.5f}", filament + moved));
   const VerifyReport report = check(heap);
-  EXPECT_NEAR(report.worst_move_extrusion_error_mm, moved, 0.01);
+  EXPECT_NEAR(report.measured.worst_move_extrusion_error_mm, moved, 0.01);
 }
 
 TEST_F(Emitted, APlaceOutOfTheTravelIsFound) {
@@ -277,7 +285,7 @@ TEST_F(Emitted, TooMuchAccelerationIsFound) {
   rules.base_max_accel_mm_s2 = 1500.0;
   const VerifyReport report = verify_text(kPrint, good_, rules);
   EXPECT_THAT(violations_of(report), HasSubstr("is above the limit 1500"));
-  EXPECT_GT(report.base_max_accel_mm_s2, 1500.0);
+  EXPECT_GT(report.measured.base.max_accel_mm_s2, 1500.0);
 }
 
 TEST_F(Emitted, AccelerationThatThePlanAsksForIsAllowed) {
@@ -412,8 +420,9 @@ TEST_F(Emitted, ALateClockIsDrift) {
     late.replace(at, 10, " F1782.000");
   }
   const VerifyReport report = verify_text(input, late, rules);
-  EXPECT_NEAR(report.worst_run_drift_s, 0.03, 0.003);
-  EXPECT_NEAR(report.emitted_time_s - report.reference_time_s, 0.03, 0.003);
+  EXPECT_NEAR(report.measured.worst_run_drift_s, 0.03, 0.003);
+  EXPECT_NEAR(report.measured.compensated.time_s - report.measured.uncompensated.time_s, 0.03,
+              0.003);
 }
 
 TEST_F(Emitted, StopsThatSetUpTheShaperAreNoSections) {
@@ -506,7 +515,8 @@ TEST(Verify, ALineThatMovesByRoundingAloneIsNoSectionOfItsOwn) {
   const std::string start = "G90\nM82\nG92 E0\nG1 Z0.3 F600\nG1 X20 Y20 F6000\n";
   const std::string input = start + "G1 E1.00000 F1800\nG1 Z0.5\nG1 X20 Y20 E1.00001\nG1 Z0.7\n";
   EXPECT_EQ(violations_of(verify_text(input, input)), "");
-  EXPECT_EQ(verify_text(input, input).emitted_time_s, verify_text(input, input).reference_time_s);
+  EXPECT_EQ(verify_text(input, input).measured.compensated.time_s,
+            verify_text(input, input).measured.uncompensated.time_s);
 }
 
 TEST(Verify, AMoveOfMoreThanAnHourIsAnInputError) {

@@ -63,9 +63,8 @@ struct LimitInPrint {
   std::size_t times = 0;  // how often it is set
 };
 
-// What was understood of a file.
-struct Inspection {
-  std::string dialect;  // "PrusaSlicer 2.5.0 …" from the file's first or last comments
+// How many of each there are in a print.
+struct PrintCounts {
   std::size_t lines = 0;
   std::size_t bytes = 0;
   std::size_t moves = 0;  // segments that move X, Y or Z
@@ -75,6 +74,12 @@ struct Inspection {
   std::size_t passive_lines = 0;
   std::size_t limit_lines = 0;
   std::size_t barrier_lines = 0;
+};
+
+// What was understood of a file.
+struct Inspection {
+  std::string dialect;  // "PrusaSlicer 2.5.0 …" from the file's first or last comments
+  PrintCounts counts;
   std::map<std::string, std::size_t> commands;  // "G1", "M204", "PRINT_START" → lines
   std::size_t runs = 0;                         // stretches that can be compensated
   std::size_t windows = 0;

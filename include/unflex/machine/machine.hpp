@@ -31,6 +31,45 @@ struct Range {
 // One value for each of X Y Z E; unset where none is given.
 using AxisOptions = std::array<std::optional<double>, 4>;
 
+// Marlin: how it draws arcs.
+struct MarlinArcs {
+  double min_segment_mm = 0.1;        // MIN_ARC_SEGMENT_MM
+  double max_segment_mm = 1.0;        // MAX_ARC_SEGMENT_MM
+  double segments_per_s = 0.0;        // ARC_SEGMENTS_PER_SEC; 0: not configured
+  double min_circle_segments = 72.0;  // MIN_CIRCLE_SEGMENTS, a whole number
+  double correction_interval = 25.0;  // N_ARC_CORRECTION, a whole number
+  bool p_circles = false;             // ARC_P_CIRCLES
+};
+
+// Marlin: how fast it passes from one move to the next.
+struct MarlinJunctions {
+  bool classic_jerk = false;           // CLASSIC_JERK instead of junction deviation
+  double min_steps_per_segment = 6.0;  // MIN_STEPS_PER_SEGMENT, a whole number
+  bool handle_small_segments = true;   // JD_HANDLE_SMALL_SEGMENTS
+  double minimum_speed_mm_s = 0.05;    // MINIMUM_PLANNER_SPEED
+};
+
+// How many steps the board and the drivers can make; 0 and "": no limit.
+struct BoardSettings {
+  double max_step_rate_hz = 0.0;        // of each motor
+  double max_total_step_rate_hz = 0.0;  // of all motors together
+  std::string driver;
+  std::string mcu;
+};
+
+// The printer's own input shaper.
+struct InputShaperSettings {
+  // Frequencies that [input_shaper] is set back to after the print (its type stays). 0: the printer
+  // has none. Unset: not known on Klipper, where every printer may have one; elsewhere none.
+  Axes<std::optional<double>> freq_hz;
+  // Type as the firmware spells it; "auto": what the firmware takes if it is told none.
+  // RepRapFirmware forgets the type when its shaper is switched off (M593 P). Klipper may have
+  // another type along Y.
+  Axes<std::string> type{"auto", "auto"};  // Y "auto": as along X
+  // Unset: the firmware's default.
+  Axes<std::optional<double>> damping_ratio;
+};
+
 struct PrinterSettings {
   Firmware firmware = Firmware::klipper;
   // Which variant of the firmware runs, if not its makers' own (docs/compatibility.md). "auto": as
@@ -52,37 +91,16 @@ struct PrinterSettings {
   double arc_resolution_mm = 1.0;  // [gcode_arcs] resolution
   // Unset: the firmware's default for Marlin and RepRapFirmware, not known for Klipper.
   AxisOptions steps_per_mm;
-  // What the board and the drivers can do; 0 and "": no limit.
-  double max_step_rate_hz = 0.0;        // of each motor
-  double max_total_step_rate_hz = 0.0;  // of all motors together
-  std::string driver;
-  std::string mcu;
+  BoardSettings board;
   // Marlin.
-  bool classic_jerk = false;                 // CLASSIC_JERK instead of junction deviation
-  double min_steps_per_segment = 6.0;        // MIN_STEPS_PER_SEGMENT, a whole number
-  bool jd_handle_small_segments = true;      // JD_HANDLE_SMALL_SEGMENTS
-  double minimum_planner_speed_mm_s = 0.05;  // MINIMUM_PLANNER_SPEED
-  double min_arc_segment_mm = 0.1;           // MIN_ARC_SEGMENT_MM
-  double max_arc_segment_mm = 1.0;           // MAX_ARC_SEGMENT_MM
-  double arc_segments_per_s = 0.0;           // ARC_SEGMENTS_PER_SEC; 0: not configured
-  double min_circle_segments = 72.0;         // MIN_CIRCLE_SEGMENTS, a whole number
-  double arc_correction_interval = 25.0;     // N_ARC_CORRECTION, a whole number
-  bool arc_p_circles = false;                // ARC_P_CIRCLES
-  bool ft_motion = false;                    // M493 S1: fixed-time motion is on
-  double linear_advance_s = 0.0;             // M900 K, 0 without LIN_ADVANCE
+  MarlinJunctions junctions;
+  MarlinArcs arcs;
+  bool ft_motion = false;         // M493 S1: fixed-time motion is on
+  double linear_advance_s = 0.0;  // M900 K, 0 without LIN_ADVANCE
   std::optional<double>
       queue_length;                 // moves the firmware plans ahead; unset: the firmware's default
   double step_clock_hz = 750000.0;  // RepRapFirmware, StepClockRate
-  // Frequencies the printer's own [input_shaper] is set back to after the print (its type stays).
-  // 0: the printer has none. Unset: not known on Klipper, where every printer may have one;
-  // elsewhere none.
-  Axes<std::optional<double>> input_shaper_freq_hz;
-  // The type of the shaper as the firmware spells it; "auto": what the firmware takes if it is told
-  // none. RepRapFirmware forgets the type when its shaper is switched off (M593 P). Klipper may
-  // have another type along Y.
-  Axes<std::string> input_shaper_type{"auto", "auto"};  // Y "auto": as along X
-  // Unset: the firmware's default.
-  Axes<std::optional<double>> input_shaper_damping_ratio;
+  InputShaperSettings input_shaper;
 };
 
 // Steps per second that the printer's board and drivers can make; infinity where nothing limits
@@ -360,8 +378,8 @@ struct Settings {
   [[nodiscard]] std::array<double, 4> print_jerk_mm_s() const;
   [[nodiscard]] bool has_print_jerk() const;
   [[nodiscard]] std::array<double, 4> steps_per_mm() const;
-  // The smallest of the limits that printer.max_step_rate_hz, max_total_step_rate_hz, driver and
-  // mcu set.
+  // The smallest of the limits that printer.max_step_rate_hz, max_total_step_rate_hz, driver
+  // and mcu set.
   [[nodiscard]] StepLimits step_limits() const;
   [[nodiscard]] double queue_length() const;
   [[nodiscard]] double retract_length_mm() const;

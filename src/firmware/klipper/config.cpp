@@ -136,7 +136,7 @@ Status parse_file(std::string_view text, const std::string& file, KlipperConfig&
     const std::string_view header = header_of(line.substr(0, line.find('#')));
     if (header.starts_with(kInclude)) {
       status = include(trimmed(header.substr(kInclude.size())), {file, number}, config, open_files);
-      // What follows has to open its section again.
+      // Lines that follow the include have to open their section again.
       parser = {.file = file, .config = &config};
     } else {
       status = parse_line(parser, line, number);

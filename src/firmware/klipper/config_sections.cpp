@@ -295,7 +295,7 @@ class Reader {
     }
   }
 
-  // What tells of more than one head, or of more than one resonance: a second carriage, a tool
+  // Looks for signs of more than one head, or of more than one resonance: a second carriage, a tool
   // changer (viesturz/klipper-toolchanger), and macros that set input shapers.
   void heads() {
     for (const auto& [name, section] : config_->sections) {

@@ -163,10 +163,10 @@ void Interpreter::input_shaper(Event& event) {
         type =
             command_.parameter(fmt::format("SHAPER_TYPE_{}", letter)).value_or(both.value_or(type));
       },
-      kAxisLetters, state_.shaper.type);
+      kAxisLetters, state_.shaper.settings.type);
   for_each_axis([](const Parameter& told,
                    std::optional<double>& ratio) { ratio = told.value ? told.value : ratio; },
-                damping, state_.shaper.damping_ratio);
+                damping, state_.shaper.settings.damping_ratio);
   for_each_axis(
       [](const Parameter& told, double& freq_hz, bool& unknown, bool& touched) {
         if (told.value) {
@@ -174,7 +174,7 @@ void Interpreter::input_shaper(Event& event) {
           unknown = touched = false;
         }
       },
-      freq, state_.shaper_freq_hz, state_.shaper_unknown, state_.shaper_touched);
+      freq, state_.shaper.freq_hz, state_.shaper.unknown, state_.shaper_touched);
   note_shaper(event);
 }
 
@@ -242,7 +242,7 @@ void Interpreter::retraction_settings(Event& event) {
     *setting.target = parameter.value.value_or(*setting.target);
   }
   options_ = changed;
-  state_.retracted = false;
+  state_.retraction.retracted = false;
 }
 
 // gcode_move.py, cmd_SET_GCODE_OFFSET: the zero moves; the machine moves only with MOVE=1.

@@ -195,14 +195,14 @@ void Interpreter::marlin_linear_move(Event& event) {
     return lose_position(event);  // further axes, a mixing extruder, or a laser's power
   }
   const std::optional<double> word = command_.value('E');
-  if (!state_.auto_retract || !word || command_.has_any("XYZ")) {
+  if (!state_.retraction.automatic || !word || command_.has_any("XYZ")) {
     return linear_move(event);
   }
   const double scale = state_.filament_factor();
   const double reading = state_.e_reading();
   const double change = state_.absolute_e ? *word * state_.e_unit - reading : *word * state_.e_unit;
   if (std::abs(change) < kShortest_mm || std::abs(change) > kLongest_mm ||
-      state_.retracted != (change > 0.0)) {
+      state_.retraction.retracted != (change > 0.0)) {
     return linear_move(event);
   }
   if (const auto feed = command_.value('F')) {
@@ -333,9 +333,9 @@ void Interpreter::marlin_retraction_settings(Event& event) {
       return;
     default:
       if (command_.has('S')) {
-        state_.auto_retract =
+        state_.retraction.automatic =
             options_.firmware_retraction && command_.value('S').value_or(1.0) != 0.0;
-        state_.retracted = false;  // fwretract.h, refresh_autoretract
+        state_.retraction.retracted = false;  // fwretract.h, refresh_autoretract
       }
       return;
   }

@@ -40,16 +40,16 @@ void marlin_junctions(CommandReader& reader, const gcode::Command& command,
 
 void marlin_shaper(CommandReader& reader, const gcode::Command& command, const SourcePlace& place) {
   if (command.has('X') || !command.has('Y')) {
-    reader.shaper("x", reader.state().shaper_freq_hz.x, reader.state().shaper.damping_ratio.x,
-                  place);
+    reader.shaper("x", reader.state().shaper.freq_hz.x,
+                  reader.state().shaper.settings.damping_ratio.x, place);
   }
   if (command.has('Y') || !command.has('X')) {
-    reader.shaper("y", reader.state().shaper_freq_hz.y, reader.state().shaper.damping_ratio.y,
-                  place);
+    reader.shaper("y", reader.state().shaper.freq_hz.y,
+                  reader.state().shaper.settings.damping_ratio.y, place);
   }
 }
 
-// A listing in the words of Marlin 1.0, said in those of today. There M204 has S for all motion
+// A listing in the words of Marlin 1.0, said in today's words. There M204 has S for all motion
 // with X, Y or Z and T for retraction, where today T is travel. M205 X is of X and Y together up to
 // the first versions of 1.1.
 std::string in_todays_words(const gcode::Command& command, std::string text) {
@@ -108,7 +108,7 @@ Status read_marlin_line(CommandReader& reader, std::string_view line, std::size_
 
 Result<Reading> read_marlin_dump(std::string_view text, const std::string& file) {
   CommandReader reader(Firmware::marlin, file);
-  // What the dump does not list was not built in.
+  // A feature that the dump does not list was not built in.
   reader.reading.add("printer.firmware_retraction", false, {file, 0});
   reader.reading.add("printer.input_shaper_freq_x_hz", 0.0, {file, 0});
   reader.reading.add("printer.input_shaper_freq_y_hz", 0.0, {file, 0});

@@ -14,7 +14,7 @@ namespace unflex::planner::marlin {
   return v2 + 2.0F * block.accel_mm_s2 * block.length_mm;
 }
 
-// What the file asks of a block.
+// The part of a block that the file decides.
 struct Request {
   Steps delta{};
   float feed_mm_s = 0.0F;

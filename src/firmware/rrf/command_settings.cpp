@@ -70,7 +70,7 @@ void Interpreter::rrf_acceleration(Event& event) {
 }
 
 // GCodes2.cpp, M205 in mm/s, M566 in mm/min and with the policy P. From 3.6 on M205 sets the jerk
-// of prints, which is at most that of M566. M566 sets both (Movement/Move.cpp, SetInstantDv).
+// of prints, which is at most the jerk of M566. M566 sets both (Movement/Move.cpp, SetInstantDv).
 void Interpreter::rrf_jerk(Event& event, double scale) {
   axis_limits(event, scale, 0.0, event.limits.edit().axis_jerk_mm_s);
   raise(event.limits.edit().axis_jerk_mm_s, kMinJerk_mm_s);

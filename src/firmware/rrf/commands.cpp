@@ -274,7 +274,6 @@ void Interpreter::rrf_g_code(Event& event) {
 }
 
 void Interpreter::rrf_m_code(Event& event) {
-  constexpr double kPerMinute = 1.0 / 60.0;
   switch (command_.number) {
     case 18:
     case 84:
@@ -293,13 +292,26 @@ void Interpreter::rrf_m_code(Event& event) {
     case 109:
       return rrf_wait_for_heater(event);
     case 120:
-      // GCodeMachineState.cpp: M120 saves the modes, and E is a length from here on. As with
-      // Klipper's SAVE_GCODE_STATE, the saved modes must be those of the file, not those of a run.
-      event.kind = EventKind::barrier;
-      pushed_states_.push_back(state_);
-      return set_volumetric(false, state_.filament_diameter_mm);
+      return rrf_push(event);
     case 121:
       return rrf_pop();
+    case 291:
+      return rrf_message_box(event);
+    case 486:
+      return object_label(event);
+    case 501:
+    case 502:
+      return limits_unknown(event);
+    default:
+      return rrf_setting(event);
+  }
+}
+
+// Carries out the M-codes that set a factor, a limit, pressure advance or the shaper, and those
+// that have no handler of their own.
+void Interpreter::rrf_setting(Event& event) {
+  constexpr double kPerMinute = 1.0 / 60.0;
+  switch (command_.number) {
     case 200:
       return rrf_volumetric();
     case 201:
@@ -316,16 +328,6 @@ void Interpreter::rrf_m_code(Event& event) {
       return rrf_speed_factor(event);
     case 221:
       return rrf_flow_factor(event);
-    case 291: {
-      // GCodes7.cpp, DoMessageBox: from S2 on it waits, and the user may move axes meanwhile.
-      constexpr double kFirstThatWaits = 2.0;
-      return command_.value('S').value_or(1.0) >= kFirstThatWaits ? lose_position(event) : void();
-    }
-    case 486:
-      return object_label(event);
-    case 501:
-    case 502:
-      return limits_unknown(event);
     case 566:
       return rrf_jerk(event, kPerMinute);
     case 572:
@@ -420,6 +422,22 @@ void Interpreter::rrf_wait_for_heater(Event& event) {
     lose_position(event);
     tool_ = to_int(command_.value('T').value_or(0.0));
   }
+}
+
+// GCodes7.cpp, DoMessageBox: from S2 on it waits, and the user may move axes meanwhile.
+void Interpreter::rrf_message_box(Event& event) {
+  constexpr double kFirstThatWaits = 2.0;
+  if (command_.value('S').value_or(1.0) >= kFirstThatWaits) {
+    lose_position(event);
+  }
+}
+
+// GCodeMachineState.cpp: M120 saves the modes, and E is a length from here on. As with Klipper's
+// SAVE_GCODE_STATE, the saved modes must be those of the file, not those of a run.
+void Interpreter::rrf_push(Event& event) {
+  event.kind = EventKind::barrier;
+  pushed_states_.push_back(state_);
+  set_volumetric(false, state_.filament_diameter_mm);
 }
 
 // GCodes.cpp, Pop: modes and F come back, positions and factors stay.

@@ -36,13 +36,13 @@ std::string firsts_of_lists(std::string_view line) {
   return text;
 }
 
-// What config.g has said up to some line.
+// Collects the settings of config.g, line by line.
 class RrfConfigReader {
  public:
   explicit RrfConfigReader(const std::string& file) : reader_(Firmware::rrf, file) {}
 
   Status take(std::string_view line, std::size_t number);
-  // What has been read, with what follows from all of it.
+  // All that has been read, with the settings that follow from it.
   Reading finish();
 
   // Heeds a line that may or may not be carried out: it may set the shaper.
@@ -184,18 +184,18 @@ Status RrfConfigReader::kinematics(const gcode::Command& command, std::string_vi
 void RrfConfigReader::shaper(const SourcePlace& place) {
   const gcode::ModalState& state = reader_.state();
   constexpr double kDefaultDampingRatio = 0.1;  // AxisShaper.h
-  if (state.shaper.type.x == "custom") {
+  if (state.shaper.settings.type.x == "custom") {
     return reader_.reading.note(
         place,
         "a custom shaper cannot be set back after the print; unflex leaves it to "
         "the file's own M593");
   }
   for (const std::string axis : {"x", "y"}) {
-    reader_.shaper(axis, state.shaper_freq_hz.x,
-                   state.shaper.damping_ratio.x.value_or(kDefaultDampingRatio), place);
+    reader_.shaper(axis, state.shaper.freq_hz.x,
+                   state.shaper.settings.damping_ratio.x.value_or(kDefaultDampingRatio), place);
   }
-  if (state.shaper_freq_hz.x > 0.0) {
-    reader_.reading.add("printer.input_shaper_type", state.shaper.type.x, place);
+  if (state.shaper.freq_hz.x > 0.0) {
+    reader_.reading.add("printer.input_shaper_type", state.shaper.settings.type.x, place);
   }
 }
 

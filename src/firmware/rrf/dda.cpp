@@ -56,7 +56,7 @@ float travel_mm(const Vector& delta) {
   return xyz > 0.0F ? xyz : std::abs(delta[E]);
 }
 
-// Removes a ramp that is too short to matter: the top speed becomes that of the move's faster end.
+// Removes a ramp that is too short to matter: the faster end's speed becomes the top speed.
 // The caller has checked that both ramps fit.
 void set_top_speed(Dda& dda) {
   const float u = dda.start_speed;

@@ -96,6 +96,34 @@ struct Shard {
   unsigned count = 1;
 };
 
+// How `study` works on the thesis' cases, or on a print (RunConfig::input).
+struct StudyConfig {
+  std::vector<std::string> cases;  // names; empty: all
+  std::string machines;            // folder of records; empty: none
+  // Tolerances that the print is to keep, µm, and whether it shall at all times.
+  std::vector<double> tolerances_um;
+  bool at_all_times = false;
+  // Accelerations to compensate the print at, whether the print's own ones are scaled, and the RMS
+  // to keep.
+  std::vector<double> accels_mm_s2;
+  bool scale_m204 = false;
+  std::optional<double> keep_rms_um;
+};
+
+struct BatchConfig {
+  std::optional<std::string> summary;  // a file ending in .json or .xml
+  std::string shard_text;              // value of --shard; empty: not given
+  std::optional<Shard> shard;          // the part of the folder that is worked on
+  bool watch = false;                  // wait for further prints
+};
+
+// How windows are solved.
+struct SolveConfig {
+  flow::EngineChoice engine = flow::EngineChoice::automatic;
+  bool check = false;  // --check-solver
+  unsigned workers = 1;
+};
+
 struct RunConfig {
   Command command = Command::compensate;
   // compensate, inspect: IN; verify: the file given to --against; printer init: --from; study: IN,
@@ -113,35 +141,21 @@ struct RunConfig {
   std::optional<std::string> printer_file;
   std::vector<std::string> overrides;  // "key=value"
   std::optional<std::string> report;   // a file ending in .json or .html, or "-"; batch: a folder
-  std::optional<std::string> summary;  // batch: a file ending in .json or .xml
-  std::string shard_text;              // value of --shard; empty: not given
-  std::optional<Shard> shard;          // batch: the part of the folder that is worked on
-  bool watch = false;                  // batch: wait for further prints
   std::optional<std::string> log;      // compensate: file to which all that was said is added
   // compensate: what messages call the print, and what the slicer that started the program says of
   // the printer (hook.hpp)
   std::string print_name;
   machine::SlicerVariables slicer_settings;
   std::optional<double> max_deviation_mm;
-  flow::EngineChoice engine = flow::EngineChoice::automatic;
-  bool check_solver = false;
-  unsigned workers = 1;
+  SolveConfig solve;
   bool quiet = false;
   bool all_settings = false;  // inspect: those at their default, too
   bool strict = false;        // compensate, verify, inspect: warnings are errors
   IdentifyConfig identify;
   TuneConfig tune;
   HotendConfig hotend;
-  std::vector<std::string> cases;  // study: names, none for all
-  std::string machines;            // study: folder of records; empty: none
-  // study: tolerances that the print is to keep, µm, and whether it shall at all times
-  std::vector<double> tolerances_um;
-  bool at_all_times = false;
-  // study: accelerations to compensate the print at, whether the print's own ones are scaled, and
-  // the RMS to keep
-  std::vector<double> accels_mm_s2;
-  bool scale_m204 = false;
-  std::optional<double> keep_rms_um;
+  StudyConfig study;
+  BatchConfig batch;
 };
 
 // The command line understood: either work to do, or a text to print instead (--help, --version).

@@ -34,10 +34,4 @@ namespace unflex::collocation {
 [[nodiscard]] PointVector node(const OptimalControlProblem& problem, std::span<const double> x,
                                int k);
 
-// The state between nodes 1 and 2 at fraction s in [0, 1] of the interval, on the cubic of the
-// method.
-[[nodiscard]] StateVector interpolate(const OptimalControlProblem& problem, double t1,
-                                      const PointVector& z1, double t2, const PointVector& z2,
-                                      double s);
-
 }  // namespace unflex::collocation

@@ -55,7 +55,7 @@ using NozzleMotionXY = Axes<NozzleMotion>;
   return map_axes([](const NozzleMotion& of_axis) { return of_axis.velocity; }, nozzle);
 }
 
-// All that determines the nozzle's motion on one axis, once that of the base is given: q_i and its
+// All that determines the nozzle's motion on one axis, once the base's motion is given: q_i and its
 // velocity. States of the same axis may be added up and scaled.
 struct NozzleState {
   std::array<NozzleMotion, kMostModes> parts{};  // zero where the axis has fewer modes

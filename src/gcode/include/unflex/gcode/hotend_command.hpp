@@ -1,4 +1,4 @@
-// What a line asks of the hotend.
+// The command that a line gives to a hotend.
 //   Klipper  kinematics/extruder.py (M104, M109, ACTIVATE_EXTRUDER), extras/heaters.py
 //            (SET_HEATER_TEMPERATURE, TURN_OFF_HEATERS, TEMPERATURE_WAIT);
 //   Marlin   gcode/temp/M104_M109.cpp;
@@ -13,7 +13,7 @@
 
 namespace unflex::gcode {
 
-// What a line asks of the hotend of a tool.
+// A command to the hotend of a tool.
 struct HotendCommand {
   std::optional<double> target_c;  // 0: off; none: the target stays
   std::optional<int> tool;         // none: the tool in use

@@ -33,8 +33,8 @@ inline constexpr std::array kXYZE{X, Y, Z, E};
 // X, Y, Z and filament, mm.
 using Position = std::array<double, 4>;
 
-// What E reads where a motion begins and ends, as Marlin keeps it (current_position.e): relative
-// words are added up in single precision.
+// The readings of E where a motion begins and ends, as Marlin keeps them (current_position.e). It
+// adds up relative words in single precision.
 struct ReadingOfE {
   float start = 0.0F;
   float end = 0.0F;
@@ -100,8 +100,8 @@ struct LimitChange {
   std::optional<int> jerk_policy;
 };
 
-// What a line that sets the input shaper again must say besides the frequencies. A setting is empty
-// if the file has not changed the configured one.
+// The settings that a line must name besides the frequencies to set the input shaper again. A
+// setting is empty if the file has not changed the configured one.
 struct ShaperSettings {
   Axes<std::string> type;  // Klipper SHAPER_TYPE, RepRapFirmware P (one type for both axes)
   Axes<std::optional<double>> damping_ratio;  // Klipper DAMPING_RATIO, Marlin D, RepRapFirmware S
@@ -141,7 +141,7 @@ enum class EventKind {
   move,     // one or more segments
 };
 
-// What one line of the input means for the machine.
+// The meaning of one line of the input for the machine.
 struct Event {
   EventKind kind = EventKind::passive;
   Line line;
@@ -177,15 +177,15 @@ struct MarlinArcs {
   bool circles = false;          // ARC_P_CIRCLES: P is a number of full circles
 };
 
-// What pressure advance is while a compensated run prints. It decides which lines a run may hold,
-// so the sliced file and the emitted one have to be read with the same value.
+// Pressure advance while a compensated run prints. It decides which lines a run may hold, so the
+// sliced file and the emitted one have to be read with the same value.
 enum class RunAdvance {
   as_sliced,
   on,   // also behind a macro, so the next value of the file does not stop the machine
   off,  // a line that sets it ends a run, since it must be off again behind that line
 };
 
-// What the firmware's configuration decides about the meaning of a line.
+// The parts of the firmware's configuration that decide about the meaning of a line.
 struct InterpreterOptions {
   Firmware firmware = Firmware::klipper;
   // The mode of E before the file's first M82 or M83.
@@ -239,6 +239,13 @@ struct PressureAdvance {
   friend bool operator==(const PressureAdvance&, const PressureAdvance&) = default;
 };
 
+// G10 and G11.
+struct FirmwareRetraction {
+  bool retracted = false;
+  double hop_mm = 0.0;     // how far G10 has lifted Z
+  bool automatic = false;  // Marlin, M209: moves of E alone are firmware retraction
+};
+
 // The state a line is read in.
 struct ModalState {
   Position position_mm{};  // machine position
@@ -260,19 +267,14 @@ struct ModalState {
   double e_unit = 1.0;                 // unit of E words: unit_mm, or its cube if Marlin reads mm³
   float e_reading_single = 0.0F;       // Marlin: the reading of E as the firmware has it
   int plane = 17;                      // G17, G18, G19
-  bool retracted = false;              // firmware retraction
-  double hop_mm = 0.0;                 // how far G10 has lifted Z
-  bool auto_retract = false;           // Marlin, M209: moves of E alone are firmware retraction
-  Axes<double> shaper_freq_hz;         // SET_INPUT_SHAPER, M593; 0: off
-  Axes<bool> shaper_unknown;           // until the file sets it
+  FirmwareRetraction retraction;
+  Shaper shaper;  // SET_INPUT_SHAPER, M593; unknown until the file sets it
   // A macro, a tool change or the like may have set the shaper since the text has.
   Axes<bool> shaper_touched{true, true};
-  ShaperSettings shaper;
   PressureAdvance pressure_advance;
   AxisValues steps_per_mm;    // M92, where the file sets it
   bool inverse_time = false;  // RepRapFirmware, G93: F is one over minutes
 
-  [[nodiscard]] Shaper input_shaper() const { return {shaper_freq_hz, shaper, shaper_unknown}; }
   // Whether an E word is a reading of the axis and not a difference.
   [[nodiscard]] bool e_is_absolute() const { return absolute_e && (absolute_xyz || !g91_covers_e); }
   // Filament per unit of E before unit and mode: M221 times, if E is a volume, one over the
@@ -280,7 +282,7 @@ struct ModalState {
   [[nodiscard]] double filament_factor() const;
   // Filament, in mm, that one unit of an E word stands for.
   [[nodiscard]] double filament_per_e_mm() const { return e_unit * filament_factor(); }
-  // What E reads, in mm or mm³, whatever the unit of its words.
+  // The reading of E in mm or mm³, whatever the unit of its words.
   [[nodiscard]] double e_reading() const {
     return (position_mm[E] - base_mm[E]) / filament_factor();
   }
@@ -344,7 +346,7 @@ class Interpreter {
   void object_label(Event& event);
   void restore_state(Event& event);
 
-  // What the firmwares share.
+  // Shared by the firmwares.
   void note_lost_motion(Event& event, const std::array<bool, 4>& known);
   void other_m_code(Event& event);
   void set_units(bool inches);
@@ -387,6 +389,7 @@ class Interpreter {
   void rrf_several_commands(Event& event);
   void rrf_g_code(Event& event);
   void rrf_m_code(Event& event);
+  void rrf_setting(Event& event);
   void rrf_arc_move(Event& event);
   void rrf_linear_move(Event& event);
   void rrf_g10(Event& event);
@@ -403,6 +406,8 @@ class Interpreter {
   void rrf_pressure_advance(Event& event);
   void rrf_shaper(Event& event);
   void rrf_wait_for_heater(Event& event);
+  void rrf_message_box(Event& event);
+  void rrf_push(Event& event);
   void rrf_pop();
 
   // False behind a line that may or may not have set a mode or F.
@@ -414,7 +419,7 @@ class Interpreter {
                      std::string_view problem);
   void keep_reading_of_e(bool e_absolute, double before_mm);
   void set_feed(std::optional<double> feed_word);
-  // What is known of where a motion starts: Segment::start_known, Segment::start_assumed.
+  // How well a motion's start is known: Segment::start_known, Segment::start_assumed.
   struct Start {
     bool known = true;
     bool assumed = false;

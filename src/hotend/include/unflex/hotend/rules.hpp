@@ -7,7 +7,6 @@
 // controller gets an integral that is k times too weak.
 #pragma once
 
-#include <optional>
 #include <string_view>
 
 #include "unflex/core/error.hpp"
@@ -32,9 +31,8 @@ enum class Rule {
 
 inline constexpr Rule kDefaultRule = Rule::simc_pid;
 
-// "simc", "simc-pi", "zn", "zn-pi", "cc", "tl": the words of a command line, and back.
+// "simc", "simc-pi", "zn", "zn-pi", "cc", "tl": the words of a command line.
 [[nodiscard]] std::string_view to_string(Rule rule);
-[[nodiscard]] std::optional<Rule> rule_of(std::string_view word);
 
 // The rules by the ultimate cycle count with a controller that samples every kUsualSample_s. An
 // error of kind input if the plant has no dead time, or is none.

@@ -15,7 +15,7 @@ namespace unflex::machine {
 [[nodiscard]] gcode::InterpreterOptions interpreter_options(const Settings& settings);
 [[nodiscard]] planner::Limits planner_limits(const Settings& settings);
 [[nodiscard]] planner::FirmwareConfig firmware_config(const Settings& settings);
-// An advance of 0 is that of the file, or the printer's.
+// An advance of 0 stands for the advance that the file or the printer has set.
 [[nodiscard]] dynamics::HotendPressure hotend_pressure(const Settings& settings);
 
 // The grid of coordinates where lines do not end on whole steps, mm.

@@ -9,7 +9,7 @@
 
 namespace unflex::machine {
 
-// A stage of the test: lines of one length at one speed, so many per second of motion.
+// A stage of the test: lines of one length at one speed, lines_per_s of them per second of motion.
 struct LineTestStage {
   double lines_per_s = 0.0;
   double speed_mm_s = 0.0;

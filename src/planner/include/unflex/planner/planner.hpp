@@ -128,7 +128,7 @@ struct PlannedMove {
   double cruise_v_mm_s = 0.0;
   double end_v_mm_s = 0.0;
   double accel_mm_s2 = 0.0;
-  // The lead: time at the speed of the start, which then leaps by so much. Marlin makes the first
+  // The lead: time at the speed of the start, which then leaps by leap_mm_s. Marlin makes the first
   // step of a line at its entry rate and counts that time as time of acceleration.
   double lead_s = 0.0;
   double leap_mm_s = 0.0;

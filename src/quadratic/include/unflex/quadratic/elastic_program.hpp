@@ -29,7 +29,7 @@ class ElasticProgram {
  public:
   using Gradient = Eigen::Matrix<double, W, 1>;
 
-  // Begins a program of so many unknowns, without any term.
+  // Begins a program of this number of unknowns, without any term.
   void reset(std::size_t unknowns);
   // Adds ½ weight (g·δ + v)². first: the first of the unknowns.
   void add_square(std::size_t first, const Gradient& g, double v, double weight);
@@ -64,15 +64,29 @@ class ElasticProgram {
     double room_step = 0.0;
     double multiplier_step = 0.0;
     double breach_step = 0.0;
-    // What the predictor foresees of Δλ Δw and of −Δλ Δs.
+    // The products Δλ Δw and −Δλ Δs as the predictor foresees them.
     double room_product = 0.0;
     double breach_product = 0.0;
   };
 
   void start();
+  // The sums over the sides of a row.
+  struct RowWeight {
+    double stiffness = 0.0;
+    double multiplier = 0.0;
+    double force = 0.0;
+  };
+
   // Builds the matrix, the gradient of the Lagrangian, and the forces of the predictor. Returns the
   // gradient's largest entry.
   double linearise();
+  // Sets the gradient of the Lagrangian to its part without rows.
+  void start_lagrangian();
+  // Sets the stiffness of the row's sides, which begin at `side`, and moves `side` behind them.
+  RowWeight weigh(std::size_t row, std::size_t& side);
+  // Adds this row and all after it whose unknowns begin at the same place. Their sum is added to
+  // the matrix once. Returns the row behind them.
+  std::size_t add_rows_at(std::size_t row, std::size_t& side);
   [[nodiscard]] bool factor();
   void back_substitute(std::vector<double>& x) const;
   // The step towards τ = 0, and the forces of the corrector. Returns how much of it can be gone.
@@ -101,7 +115,7 @@ class ElasticProgram {
   std::vector<double> delta_;
   std::vector<double> lagrangian_;
   std::vector<double> step_;
-  // Forces of the corrector: those without τ, and those of τ = 1.
+  // Forces of the corrector: the part without τ, and the factor of τ.
   std::vector<double> corrector_;
   std::vector<double> of_target_;
 };

@@ -14,13 +14,17 @@ namespace unflex::report {
 
 // The flow difference: "at most 3.1 % more than as sliced over 10 ms, near line 813; 1.2 for 99 %
 // of the time".
-[[nodiscard]] std::string flow_difference_text(const FlowDifferenceRow& difference);
+[[nodiscard]] std::string flow_difference_text(const verify::FlowDifference& difference);
 
-// "21 times less than now", of an error that was so many times as large; 0: none is left.
+// "21 times less than now". times: the error before over the error now; 0: none is left.
 [[nodiscard]] std::string times_text(double times);
 
 // "16.2 → 0.54": shares as percent, without the unit.
 [[nodiscard]] std::string percent_change_text(double from, double to);
+// As that, the RMS error of the line's width if the hotend is another.
+[[nodiscard]] std::string width_change_text(const verify::LineStats& before,
+                                            const verify::LineStats& after,
+                                            verify::OtherHotend hotend);
 
 // "0.90 to 3.10": the least and the greatest RMS of the plants, µm, without the unit.
 [[nodiscard]] std::string range_text(const std::vector<PlantDeviation>& plants,

@@ -34,7 +34,7 @@ enum class Stage {
   lined,     // the base is known and cut into lines, or why the run is kept
 };
 
-// What became of one axis of a window.
+// How the solution of one axis of a window ended.
 struct AxisResult {
   dynamics::AxisTrajectory base;
   int iterations = 0;
@@ -181,7 +181,7 @@ void lay_out(RunJob& job);
 [[nodiscard]] std::vector<compensate::RunWindow> windows_of(const RunJob& job, std::size_t first,
                                                             std::size_t count);
 
-// Notes that so many more axes of windows are solved. Returns whether they were the last, so that
+// Notes that `axes` more axes of windows are solved. Returns whether they were the last, so that
 // the run is solved.
 bool note_solved(RunJob& job, std::size_t axes);
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "unflex/report/report.hpp"
+#include "unflex/verify/measured.hpp"
 
 namespace unflex::study {
 
@@ -16,8 +17,8 @@ struct AtAccel {
   double sliced_time_s = 0.0;
   double time_s = 0.0;  // compensated
   // While filament is laid.
-  report::DeviationRow sliced;
-  report::DeviationRow compensated;
+  verify::DeviationStats sliced;
+  verify::DeviationStats compensated;
 };
 
 struct AccelsOutcome {

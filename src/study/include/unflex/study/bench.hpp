@@ -121,7 +121,7 @@ struct Straying {
   void merge(const Straying& other);
 };
 
-// What base and nozzle do, for figures.
+// The motion of base and nozzle, for figures.
 struct Trace {
   rivals::TimeGrid grid;
   std::vector<dynamics::NozzleMotionXY> base;

@@ -42,11 +42,11 @@ struct PathErrors {
   double max_mm = 0.0;
 };
 
-// What it means that a motion keeps a tolerance. This is the only place that says so.
+// Decides whether a motion keeps a tolerance. No other place says what that means.
 struct ToleranceRule {
   // The errors are within the tolerance for this share of the extruding time.
   static constexpr double kShareWithin = 0.999;
-  // In the rest of it they are at most so many times as large; 1: within it at all times.
+  // In the rest of the time they are at most this many times the tolerance. 1: always within it.
   double largest_times = 1.1;
 
   [[nodiscard]] bool keeps(const PathErrors& errors, double tolerance_mm) const {
@@ -61,7 +61,7 @@ struct TimedMotion {
   PathErrors errors;
 };
 
-// What unflex is called among the contenders.
+// The name of unflex among the contenders.
 inline constexpr std::string_view kUnflex = "unflex";
 
 // A way to move the base, with the fastest motions that it is found to allow.

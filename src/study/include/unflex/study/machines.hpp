@@ -62,7 +62,7 @@ struct MachineResult {
   [[nodiscard]] const ContenderResult& of(Contender contender, std::size_t shift = kNoShift) const {
     return shifted[shift][static_cast<std::size_t>(contender)];
   }
-  // RMS of unflex over that of the best shaper; 0 if that is 0.
+  // The RMS of unflex divided by the RMS of the best shaper; 0 if the latter is 0.
   [[nodiscard]] double ratio(std::size_t shift) const;
 };
 

@@ -16,17 +16,9 @@
 #include "unflex/core/xy.hpp"
 #include "unflex/planner/planner.hpp"
 #include "unflex/verify/log_histogram.hpp"
+#include "unflex/verify/measured.hpp"
 
 namespace unflex::verify {
-
-// Every corner counts as much as any other.
-struct CornerStats {
-  std::size_t count = 0;
-  double rms_mm = 0.0;
-  double p99_mm = 0.0;  // from a histogram with cells less than 1 % apart
-  double max_mm = 0.0;
-  std::size_t max_line = 0;  // line of the sliced file that leads to the corner of max_mm
-};
 
 class CornerAccumulator {
  public:

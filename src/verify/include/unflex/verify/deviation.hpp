@@ -14,34 +14,9 @@
 #include "unflex/dynamics/flexible_axis.hpp"
 #include "unflex/planner/planner.hpp"
 #include "unflex/verify/log_histogram.hpp"
+#include "unflex/verify/measured.hpp"
 
 namespace unflex::verify {
-
-// Weighted by time: every sample counts for the time it stands for.
-struct DeviationStats {
-  double contour_max_mm = 0.0;
-  double contour_p99_mm = 0.0;  // from a histogram with cells less than 1 % apart
-  double contour_p999_mm = 0.0;
-  double contour_rms_mm = 0.0;
-  double tracking_max_mm = 0.0;
-  double tracking_rms_mm = 0.0;
-  double duration_s = 0.0;           // time that the statistics cover
-  std::size_t contour_max_line = 0;  // line of the sliced file nearest to the largest contour error
-};
-
-// The nozzle's speed while it lays filament, relative to the F of the nearest part of the path.
-struct FeedStats {
-  double p999 = 0.0;  // it is below for 99.9 % of the time
-  double max = 0.0;
-  std::size_t max_line = 0;  // of the sliced file
-};
-
-struct Deviation {
-  DeviationStats extruding;  // while the text that is played lays filament
-  // While the reference moves in X or Y. For a whole file, also while the base is held after its
-  // end.
-  DeviationStats all;
-};
 
 // Gathers samples, given by the squares of their errors.
 class DeviationAccumulator {

@@ -12,6 +12,7 @@
 
 #include "unflex/core/xy.hpp"
 #include "unflex/verify/deviation.hpp"
+#include "unflex/verify/nearest_along.hpp"
 #include "unflex/verify/reference_path.hpp"
 
 namespace unflex::verify {
@@ -43,7 +44,7 @@ class NearPath {
     double start_s = 0.0;
     double end_s = 0.0;
   };
-  // All of them, by time. The first is that of piece number first().
+  // All spans, by time. The first one belongs to piece number first().
   [[nodiscard]] const Span* spans() const { return spans_.data() + dropped_; }
   [[nodiscard]] std::size_t span_count() const { return end_ - first_; }
   [[nodiscard]] std::size_t first() const { return first_; }
@@ -125,14 +126,14 @@ inline double NearPath::squared_contour_error(const ReferencePath& path, const X
   for (std::size_t number = first_; number < end_; ++number) {
     const Span& span = spans()[number - first_];
     const XY off_mm = p_mm - span.start_mm;
-    double along = std::clamp(dot(off_mm, span.direction), 0.0, span.length_mm);
+    double along = nearest_along_mm(off_mm, span.direction, span.length_mm);
     if (is_begin_cut && number == first_ && along < begin_bound_mm(path)) {
       along = std::max(along, begin_mm(path));
     }
     if (is_end_cut && number + 1 == end_ && along > end_bound_mm(path)) {
       along = std::min(along, end_mm(path));
     }
-    const double distance2 = squared(off_mm - along * span.direction);
+    const double distance2 = distance2_mm2(off_mm, span.direction, along);
     if (distance2 < best) {
       best = distance2;
       nearest = number;

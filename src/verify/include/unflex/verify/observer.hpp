@@ -12,7 +12,7 @@
 
 namespace unflex::verify {
 
-// What a nozzle hangs on.
+// The base that a nozzle hangs on.
 enum class NozzleBase {
   sliced,    // the sliced file's plan, as long as the printer has used no shaper
   shaped,    // what the printer's own shaper has made of that plan
@@ -32,7 +32,7 @@ struct NozzleStep {
   double h_s = 0.0;
   dynamics::NozzleMotionXY nozzle;
   dynamics::BaseXY base;
-  // What is played now lays filament.
+  // Whether the base's motion lays filament.
   bool extruding = false;
   // Distance from the path, and the line of the sliced file that is nearest to the nozzle: the
   // square of the distance, its mean during the step, and the largest that it was during the step
@@ -91,7 +91,7 @@ inline constexpr std::array<double, 6> kFrequencyErrors = {-0.15, -0.10, -0.05, 
 // `model` with each of kFrequencyErrors.
 [[nodiscard]] std::vector<NozzleModel> detuned(const NozzleModel& model);
 
-// What to measure besides the rules' nozzle, and who watches.
+// The nozzles to measure besides the rules' nozzle, and who watches.
 struct Observation {
   // Further nozzles that hang on the same two bases: those of verify::detuned() first, which a
   // recorder needs, then any others.

@@ -17,13 +17,13 @@
 
 namespace unflex::verify {
 
-// The motors of X, Y and Z, in the order of `Motors`, and that of the filament.
+// The motors of X, Y and Z, in the order of `Motors`, and then the extruder's motor.
 inline constexpr std::size_t kStepMotors = Motors::kCount + 1;
 
-// What the motors are called: "X", "Y", "Z", "E", with "A" and "B" where a CoreXY moves X and Y.
+// The names of the motors: "X", "Y", "Z", "E", with "A" and "B" where a CoreXY moves X and Y.
 [[nodiscard]] std::array<std::string_view, kStepMotors> step_motor_names(Kinematics kinematics);
 
-// What is known of the motors' steps, and how many per second are allowed.
+// The motors' steps per mm, and how many per second are allowed.
 struct StepRules {
   std::array<double, kStepMotors> steps_per_mm{};  // 0: not known, the motor is not counted
   double max_hz = std::numeric_limits<double>::infinity();        // of each motor

@@ -15,7 +15,8 @@
 #include "unflex/planner/planner.hpp"
 #include "unflex/verify/corners.hpp"
 #include "unflex/verify/deviation.hpp"
-#include "unflex/verify/line_stats.hpp"
+#include "unflex/verify/line_model.hpp"
+#include "unflex/verify/measured.hpp"
 #include "unflex/verify/observer.hpp"
 #include "unflex/verify/step_rates.hpp"
 
@@ -37,11 +38,12 @@ struct Leeway {
   double times = 1.02;
   double rms_mm = 0.5e-3;
   double max_mm = 3e-3;
-  // Where the firmware rounds to steps, a single place may by chance be off by so much more.
+  // A distance that is allowed besides where the firmware rounds to steps, since a single place may
+  // be off by chance.
   double chance_mm = 0.0;
 };
 
-// Where the timing is free, the nozzle may stray so many times the tolerance at its worst.
+// Where the timing is free, the nozzle may at its worst stray this many times the tolerance.
 inline constexpr double kTimesTolerance = 1.1;
 
 struct Rules {
@@ -56,17 +58,19 @@ struct Rules {
   double base_max_accel_mm_s2 = 20000.0;
   double base_accel_times_plan = 0.0;
   double max_lines_per_s = std::numeric_limits<double>::infinity();
-  // What a compensated run may ask of the motors. Sliced motion that asks for more breaks no rule
-  // (VerifyReport::sliced_step_breaches).
+  // The step rates that a compensated run may ask for. Sliced motion that asks for more breaks no
+  // rule (VerifyReport::sliced_step_breaches).
   StepRules steps;
   LineModel line;
   double filament_area_mm2 = 2.405281875467;  // cross-section; here of 1.75 mm
-  // What the hotend melts. It breaks no rule to ask for more (VerifyReport::too_much_flow).
+  // The most that the hotend melts. It breaks no rule to ask for more
+  // (VerifyReport::too_much_flow).
   double max_flow_mm3_s = std::numeric_limits<double>::infinity();
   // Whether the output may ask for a temperature earlier than the sliced file.
   bool may_ask_ahead = false;
   Leeway leeway;
-  // What the nozzle may stray in a run whose timing is not as sliced. 0: all runs are as sliced.
+  // How far the nozzle may stray in a run whose timing is not as sliced. 0: all runs are timed as
+  // sliced.
   double tolerance_mm = 0.0;
   // The emitted file has an Interpreter::approach wherever unflex would write one. A file that
   // unflex has not written has none.
@@ -91,37 +95,9 @@ struct BlamedRun {
 // duration. The other figures are 0.
 struct Detuned {
   Deviation uncompensated;
-  // As VerifyReport::unshaped. Only if an observer asks for it.
+  // As Measured::unshaped. Only if an observer asks for it.
   std::optional<Deviation> unshaped;
   Deviation compensated;
-};
-
-// Distance along the sliced path between the nozzle and the place whose filament comes out, while
-// the reference lays filament.
-struct LagStats {
-  double rms_mm = 0.0;  // weighted by time
-  double max_mm = 0.0;
-  std::size_t max_line = 0;  // line of the sliced file with the largest lag
-};
-
-// Volume of filament per second in moves of X and Y, as a mean over 20 ms, and how fast it changes:
-// by how much it is another one 20 ms later, divided by that time. The lines are those of the file
-// that is measured: the one that is played at the end of the mean, and the one in the middle of the
-// change.
-struct FlowStats {
-  double max_mm3_s = 0.0;
-  std::size_t max_line = 0;
-  double max_change_mm3_s2 = 0.0;
-  std::size_t max_change_line = 0;
-};
-
-// How much the output's rate of filament differs from the sliced file's at the same time, by the
-// means of both over 10 ms in which the sliced file lays filament all the time.
-struct FlowDifference {
-  // By how much the output lays more, relative to the sliced file, where the two differ most.
-  double relative = 0.0;
-  std::size_t line = 0;  // of the sliced file, in the middle of these 10 ms
-  double p99 = 0.0;      // what it stays within, either way, for 99 % of the time
 };
 
 // A place where the output asks for more flow than Rules::max_flow_mm3_s and than the sliced file
@@ -140,60 +116,17 @@ struct TimeNote {
 };
 
 struct VerifyReport {
-  // The input as this printer plays it, its own shaper included. Measured against the firmware's
-  // plan of the input.
-  Deviation uncompensated;
-  // The input without the printer's shaper; nullopt if none acts.
-  std::optional<Deviation> unshaped;
-  // Compensated runs begin and end at rest, so each is measured against its own plan from rest to
-  // rest. If the input passes into or out of the run at speed, that plan takes some ms longer.
-  Deviation compensated;
-  std::vector<Detuned> detuned;   // one for each of Observation::detuned
-  double reference_time_s = 0.0;  // duration of the input by the firmware's plan, dwells included
-  double emitted_time_s = 0.0;    // duration of the output
-  // Largest mean velocity of one move of the replayed base, over the motors of X and Y. Compensated
-  // runs only.
-  double base_max_velocity_mm_s = 0.0;
-  // Largest change of mean velocity between neighbouring moves, divided by the time between their
-  // middles. Motors and runs as for base_max_velocity_mm_s.
-  double base_max_accel_mm_s2 = 0.0;
-  double base_max_step_mm_s = 0.0;  // that change itself, which a motor takes at once
-  // The largest acceleration that a run's motors were allowed; 0 without such runs.
-  double base_accel_limit_mm_s2 = 0.0;
-  double input_extrusion_mm = 0.0;  // net filament
-  double output_extrusion_mm = 0.0;
-  // Largest filament error of one move or one run of the input. What the output's lines cannot
-  // resolve in time is no error.
-  double worst_move_extrusion_error_mm = 0.0;
-  LagStats uncompensated_lag;
-  LagStats compensated_lag;
-  // How fast the nozzle goes in runs whose timing is free.
-  FeedStats compensated_feed;
-  // How far the nozzle passes from the corners of the sliced path.
-  CornerStats uncompensated_corners;
-  CornerStats compensated_corners;
-  LineStats uncompensated_line;
-  LineStats compensated_line;
-  FlowStats uncompensated_flow;
-  FlowStats compensated_flow;
+  Measured measured;
+  std::vector<Detuned> detuned;              // one for each of Observation::detuned
   std::optional<TooMuchFlow> too_much_flow;  // where the flow is largest
-  // Compensated runs in the timing as sliced, each against its own plan as in `compensated`.
-  // nullopt if none lays filament for 10 ms.
-  std::optional<FlowDifference> flow_difference;
-  StepRates sliced_steps;   // lines of the sliced file
-  StepRates emitted_steps;  // lines of the output
+  StepRates sliced_steps;                    // lines of the sliced file
+  StepRates emitted_steps;                   // lines of the output
   std::vector<StepBreach> sliced_step_breaches;
-  // Longest lag or lead of the nozzle against the plan of its run, averaged over 0.1 s.
-  double worst_run_drift_s = 0.0;
-  double max_lines_per_s = 0.0;    // most lines begun in any 100 ms of the output, × 10
-  double segment_ms_median = 0.0;  // median duration of the output's moves inside compensated runs
-  std::size_t runs = 0;            // number of compensated runs
-  std::size_t output_lines = 0;
-  std::size_t output_bytes = 0;
+  std::size_t runs = 0;                // number of compensated runs
   std::vector<Violation> violations;   // the first 100 at most
   std::size_t violation_count = 0;     // number of all violations
   std::vector<BlamedRun> blamed_runs;  // in the order of the file
-  std::vector<TimeNote> time_notes;    // likewise
+  std::vector<TimeNote> time_notes;    // in the order of the file
 };
 
 // The first hard rule that is broken by `base`, the replayed moves of one compensated run; nullopt
