@@ -33,7 +33,7 @@ constexpr std::chrono::milliseconds kPatience{100};
 constexpr std::chrono::milliseconds kBetweenSweeps{2};
 constexpr std::chrono::milliseconds kBetweenLooks{2000};
 
-// Settings are checked first, so that what is wrong with them is said once and not for every print.
+// Checks the settings first, so that an error in them is reported once and not for every print.
 Status check_printer_file(const RunConfig& config) {
   const auto state =
       config.printer_file ? platform::state_of(*config.printer_file) : tl::unexpected(ENOENT);
@@ -101,7 +101,7 @@ Status check_summary(const RunConfig& config, const BatchFiles& files) {
                : Status{};
 }
 
-// What `unflex compensate` would be asked for this print.
+// The configuration with which `unflex compensate` would make this print.
 RunConfig config_of(const RunConfig& config, const BatchPrint& print, unsigned workers) {
   RunConfig one = config;
   one.command = Command::compensate;
@@ -189,7 +189,7 @@ class Batch {
  private:
   [[nodiscard]] std::uint64_t bytes(std::size_t print) const { return files_.prints[print].bytes; }
 
-  // waiting: the next print is at the end.
+  // waiting: the prints still to do. The last one is taken next.
   Status work_on(std::vector<std::size_t> waiting) {
     BatchWorkers processes(config_->solve.workers);
     while (!waiting.empty() || processes.any()) {
@@ -226,7 +226,7 @@ class Batch {
       fail_by({ErrorKind::internal, {print.input, 0}, answer.error}, answer);
     } else if (answer.state == BatchState::done) {
       if (const Status remembered = manifest_->put(print.name, answer.record); !remembered) {
-        // The output is whole, but the next batch will make it once more.
+        // The output is complete, but the manifest lacks it. So the next batch will make it again.
         fail_by(remembered.error(), answer);
       }
     }
@@ -268,7 +268,7 @@ class Batch {
   BatchSummary summary_;
 };
 
-// Leaves the prints of the shard. What is wrong with the folder is told by the first shard alone.
+// Keeps the prints of this shard only. Errors in the folder are reported by the first shard alone.
 void keep_shard(const RunConfig& config, BatchFiles& files) {
   if (!config.batch.shard) {
     return;

@@ -51,8 +51,8 @@ class Finder {
     }
   }
 
-  // Takes what is in the folder, whose name below the root is `below`. printer_file: of the folder
-  // above.
+  // Takes the prints in `folder`, whose name below the root is `below`. printer_file: the printer
+  // file of the folder above.
   void look(const std::string& folder, const std::string& below,
             const std::optional<std::string>& printer_file, BatchFiles& files) {
     const auto entries = platform::entries_of(folder);
@@ -69,7 +69,7 @@ class Finder {
   }
 
  private:
-  // What is named on the command line holds for the folder of the batch itself.
+  // A printer file named on the command line holds for the folder of the batch itself.
   [[nodiscard]] std::optional<std::string> printer_file_of(const std::string& folder,
                                                            const std::string& below) const {
     std::string file = joined(folder, kPrinterFileName);
@@ -137,7 +137,7 @@ Status check_folders(const RunConfig& config) {
     return fail(ErrorKind::input, {config.input, 0},
                 "is not a folder; for one print there is unflex compensate");
   }
-  // We do not compare names: a folder may have several of them where capitals do not count.
+  // Names are not compared: one folder may have several names where capitals do not count.
   if (platform::same_file(config.input, config.output)) {
     return fail(ErrorKind::usage, {config.output, 0},
                 "is the folder of the prints too; give -o another");

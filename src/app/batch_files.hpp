@@ -24,8 +24,8 @@ struct BatchPrint {
   std::string input;
   std::string output;
   std::optional<std::string> report;
-  // The printer file in its own folder, or in the next folder above that has one. Unset: the one of
-  // the command line.
+  // The printer file in the print's own folder, or in the next folder above that has one. Unset:
+  // the printer file of the command line.
   std::optional<std::string> printer_file;
   std::uint64_t bytes = 0;
 };
@@ -33,13 +33,13 @@ struct BatchPrint {
 struct BatchFiles {
   std::vector<BatchPrint> prints;     // sorted by name
   std::vector<Error> unreadable;      // folders that could not be looked into
-  std::vector<Diagnostic> passed_by;  // what looks like a print and was left out
+  std::vector<Diagnostic> passed_by;  // files that look like a print but were left out
 };
 
 // The printer file of a folder, which holds for the prints in it and below.
 inline constexpr std::string_view kPrinterFileName = "printer.toml";
 
-// The name of what is in the folder, without the folder's; "." for the folder itself.
+// The name of a file below the folder, without the folder's own name; "." for the folder itself.
 [[nodiscard]] std::string name_below(std::string_view folder, std::string_view file);
 
 // Looks through the folder config.input, and all below, for prints. The output mirrors it in

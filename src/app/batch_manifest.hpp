@@ -1,4 +1,4 @@
-// The memory of a batch in its output folder: which outputs are there, and what each was made from.
+// The record of a batch in its output folder: which outputs there are, and the sources of each.
 #pragma once
 
 #include <map>
@@ -14,19 +14,19 @@
 namespace unflex::app {
 
 inline constexpr std::string_view kManifestName = ".unflex-batch.json";
-// Each shard has one of its own: ".unflex-batch.2-of-8.json".
+// The name of the manifest. Each shard has its own: ".unflex-batch.2-of-8.json".
 [[nodiscard]] std::string manifest_name(const std::optional<Shard>& shard);
 
 class BatchManifest {
  public:
-  // Makes the folder if there is none, claims it for this process and those it forks, or, for a
-  // shard, together with other shards. Reads all manifests that are there. One that is damaged or
-  // of another version counts for nothing. Errors are of kind usage: the folder cannot be written,
-  // or another batch works in it.
+  // Makes the folder if there is none. Claims it for this process and the processes that it forks.
+  // A shard claims it together with other shards. Reads all manifests in the folder. A damaged
+  // manifest, or one of another version, counts for nothing. Errors are of kind usage: the folder
+  // cannot be written, or another batch works in it.
   [[nodiscard]] static Result<BatchManifest> open(const std::string& folder,
                                                   const std::optional<Shard>& shard);
 
-  // What is known of the print's output, by any of the manifests.
+  // The records of the print's output in all manifests.
   [[nodiscard]] std::vector<BatchRecord> find(const std::string& name) const;
 
   // Remembers the record, on the disk too before it returns. Errors are of kind internal.

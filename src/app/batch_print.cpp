@@ -81,7 +81,7 @@ Result<std::string> hash_of_settings(const RunConfig& config) {
   return sha256(text);
 }
 
-// What an output made now would be made from. The hashes of output and report stay empty.
+// The origin of an output that would be made now. The hashes of output and report stay empty.
 Result<BatchOrigin> origin_now(const RunConfig& config) {
   Result<std::string> input = hash_of_file(config.input);
   if (!input) {

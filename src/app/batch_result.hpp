@@ -1,5 +1,5 @@
-// What became of one print of a batch, as it goes from the process that worked on it to the batch,
-// into the manifest and into the summary.
+// The result of one print of a batch. The process that worked on the print passes it to the batch,
+// which puts it into the manifest and the summary.
 #pragma once
 
 #include <optional>
@@ -11,7 +11,7 @@
 
 namespace unflex::app {
 
-// What was measured, of extruding moves.
+// Figures measured on extruding moves.
 struct BatchFigures {
   double max_before_mm = 0.0;
   double max_after_mm = 0.0;
@@ -20,11 +20,11 @@ struct BatchFigures {
   double print_time_s = 0.0;
 };
 
-// What an output was made from: an output is up to date if none of it has changed.
+// The sources of an output. The output is up to date if none of them has changed.
 struct BatchOrigin {
   std::string version;
   std::string input_sha256;
-  std::string settings_sha256;  // hash of all that decides about the output, beside the input
+  std::string settings_sha256;  // hash of everything but the input that decides the output
   std::string output_sha256;
   std::string report_sha256;  // empty without a report
 

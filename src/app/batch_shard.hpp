@@ -14,9 +14,9 @@ namespace unflex::app {
 // The value of a variable of the environment, if it is set.
 using Variable = std::function<std::optional<std::string>(const std::string& name)>;
 
-// What --shard says: "2/8" is the second of eight. "auto" takes both from Slurm: the task of a job
-// array, or of srun. "auto/8" takes the number from these or from a Kubernetes indexed job. An
-// error of kind usage if it says neither.
+// The shard that --shard names. "2/8" is the second of eight. "auto" takes both numbers from Slurm:
+// the task of a job array, or of srun. "auto/8" takes the shard's number from Slurm or from a
+// Kubernetes indexed job. An error of kind usage if the text names no shard.
 [[nodiscard]] Result<Shard> shard_of(std::string_view text, const Variable& variable);
 
 // Whether the print belongs to the shard. That depends on its name alone, so that machines agree

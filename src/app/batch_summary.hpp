@@ -1,4 +1,4 @@
-// What a batch tells in the end: a table for people, JSON and JUnit XML for programs.
+// The summary of a batch: a table for people, JSON and JUnit XML for programs.
 #pragma once
 
 #include <optional>
@@ -22,7 +22,7 @@ struct BatchSummary {
   std::string output;
   std::optional<Shard> shard;
   std::vector<BatchRow> rows;          // sorted by name
-  std::vector<std::string> passed_by;  // what was left out, and why
+  std::vector<std::string> passed_by;  // files that were left out, and why
   double wall_s = 0.0;
 
   [[nodiscard]] std::size_t count(BatchState state) const;
@@ -39,11 +39,11 @@ struct BatchSummary {
 [[nodiscard]] std::string summary_table(const BatchSummary& summary);
 [[nodiscard]] std::string summary_json(const BatchSummary& summary);
 
-// As continuous integration reads it: a print is a test case. A deviation above --max-deviation is
-// a failure, anything else that went wrong an error.
+// JUnit XML for continuous integration. A print is a test case. A deviation above --max-deviation
+// is a failure. Anything else that went wrong is an error.
 [[nodiscard]] std::string summary_junit(const BatchSummary& summary);
 
-// Text within XML. What is not UTF-8 or no character of XML 1.0 becomes U+FFFD.
+// Text for XML. Bytes that are not UTF-8, and characters that XML 1.0 lacks, become U+FFFD.
 [[nodiscard]] std::string xml_text(std::string_view text);
 
 }  // namespace unflex::app

@@ -1,7 +1,7 @@
-// Works on prints side by side: each in a process of its own where the system can fork, and else in
-// a thread. Solving by Ipopt forks workers before its process has any thread, so two prints cannot
-// share a process there. And a print whose process crashes, or is killed for want of memory, leaves
-// the others alone.
+// Works on prints side by side. Each print has a process of its own where the system can fork,
+// otherwise a thread. Ipopt forks workers before its process has any thread, so two prints that it
+// solves cannot share a process. A print whose process crashes, or is killed for want of memory,
+// leaves the others alone.
 #pragma once
 
 #include <chrono>
@@ -21,7 +21,7 @@ class BatchWorkers {
 
   struct Done {
     std::size_t ticket = 0;
-    bool answered = false;  // if not, the error says how the process ended, without a place
+    bool answered = false;  // false: the error says how the process ended, without a place
     BatchAnswer answer;
     double wall_s = 0.0;
   };
@@ -33,8 +33,8 @@ class BatchWorkers {
   // Ends the prints under way. Asks them first, so that they remove their temporary files.
   ~BatchWorkers();
 
-  // How many workers the next of `waiting` prints gets, 0 while none is free. All waiting prints
-  // share the free workers.
+  // The number of workers for the next of `waiting` prints; 0 while no worker is free. All waiting
+  // prints share the free workers.
   [[nodiscard]] unsigned workers_for_next(std::size_t waiting) const;
 
   // Begins the work. Its answer comes back with the ticket.

@@ -19,7 +19,8 @@ constexpr const char* kReportOfModel = "Write a report, FILE.json or FILE.html, 
 
 // Options for a resonance that shows in a print: spacing, speed and decay of its waves.
 void add_tower(CLI::App& command, RunConfig& config) {
-  // How exactly a ruler tells them: half the width of the interval, as a share.
+  // Half the width of the interval in which a value read with a ruler lies, as a share of the
+  // value.
   constexpr double kShareOfSpacing = 0.05;
   constexpr double kShareOfDecay = 0.2;
   const auto tower = [&config]() -> identify::Tower& {

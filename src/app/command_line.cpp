@@ -39,7 +39,7 @@ void add_max_deviation(CLI::App& command, RunConfig& config) {
       ->check(positive());
 }
 
-// A flag that takes a value behind an equals sign alone, since the input's name may follow it.
+// Adds a flag whose value stands behind an equals sign only, since the input's name may follow it.
 void add_faster(CLI::App& command, RunConfig& config) {
   command
       .add_flag("--faster", config.faster_um,
@@ -319,7 +319,7 @@ void add_printer(CLI::App& program, RunConfig& config) {
   keys->callback([&config] { config.command = Command::printer_keys; });
 }
 
-// The words of the command that was chosen, as for its help, and what it is to the library.
+// The chosen command: its words as the help shows them, and its object in CLI11.
 struct Chosen {
   std::string words = "unflex";
   const CLI::App* app;
@@ -362,8 +362,8 @@ std::optional<std::string> unknown_option(const CLI::App& command) {
   return std::nullopt;
 }
 
-// The library's messages start with a capital and may have several lines. What it says of a
-// misspelt option is an unexpected argument, or that the option meant is missing.
+// The library's messages start with a capital and may have several lines. For a misspelt option the
+// library reports an unexpected argument, or a missing option.
 std::string parser_message(const CLI::App& program, const CLI::Error& error) {
   const Chosen chosen = chosen_of(program);
   std::string message = one_line(error.what());
@@ -376,7 +376,7 @@ std::string parser_message(const CLI::App& program, const CLI::Error& error) {
                      chosen.words);
 }
 
-// What the program says when the library has thrown while it read the arguments.
+// The program's answer to an exception that the library has thrown while it read the arguments.
 Result<CommandLine> answer_to(const std::exception& thrown, const CLI::App& program) {
   if (dynamic_cast<const CLI::CallForHelp*>(&thrown) != nullptr) {
     return CommandLine{std::nullopt, program.help()};
@@ -464,7 +464,7 @@ Result<CommandLine> parse_command_line(const std::vector<std::string>& arguments
   if (Status values = check_values(arguments); !values) {
     return tl::unexpected(values.error());
   }
-  // What the library throws is its answer, if it is not a plain yes.
+  // Set only if the library throws. The exception is then its answer.
   std::optional<Result<CommandLine>> answer;
   platform::catching(
       [&] { program.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend())); },

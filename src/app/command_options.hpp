@@ -1,4 +1,4 @@
-// What options of several commands share.
+// Parts that the options of several commands share.
 #pragma once
 
 #include <fmt/format.h>
@@ -43,8 +43,9 @@ template <class T>
           ""};
 }
 
-// The number that was given to an option. All options with numbers are read by it: CLI11 would read
-// a long double, whose last bit differs between systems, and WASI's library ends the program there.
+// The number that was given to an option. All options with numbers use this function. CLI11 would
+// read a long double: its last bit differs between systems, and WASI's library ends the program
+// there.
 [[nodiscard]] double number_of(const std::string& option, const std::string& text);
 
 // An option with a number.
@@ -69,7 +70,7 @@ inline constexpr const char* kReportOrPage =
 
 inline constexpr const char* kNoSummary = "No summary and no progress bar";
 
-// --printer, --set, --report and -q, the last two with what their help says.
+// Adds --printer, --set, --report and -q. The help of the last two is `report` and `quiet`.
 void add_common_options(CLI::App& command, RunConfig& config, const char* report = kReportOrPage,
                         const char* quiet = kNoSummary);
 

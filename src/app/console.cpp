@@ -21,7 +21,7 @@ constexpr std::string_view kRed = "\033[1;31m";
 constexpr std::string_view kYellow = "\033[1;33m";
 constexpr std::string_view kPlain = "\033[0m";
 
-// What is left of the line without its place, numbers and quoted text.
+// The kind of a line: the line without its place, numbers and quoted text.
 std::string kind_of(std::string_view line) {
   line.remove_prefix(std::min(line.find(": "), line.size()));
   std::string kind;
@@ -71,7 +71,8 @@ std::string coloured_line(std::string_view line) {
 
 std::string coloured_error(const Error& error) {
   const std::string text = error_text(error);
-  // A message may have colons of its own, and so may the name of a file. So its end is counted.
+  // The message is found by its length, because a message or a file's name may have colons of its
+  // own.
   const std::size_t message = one_line(error.message).size();
   const std::size_t place = text.size() - std::min(text.size(), message);
   return fmt::format("{}{}{}{}", kRed, text.substr(0, place), kPlain, text.substr(place));
@@ -93,7 +94,7 @@ std::vector<std::string> summarised(const std::vector<std::string>& lines, std::
   for (std::size_t i = 0; i < std::min(kinds.size(), kMaxKinds); ++i) {
     const std::vector<const std::string*>& alike = of_kind[kinds[i]];
     left -= alike.size();
-    // If only one line is too many, showing it takes no more room than the remark.
+    // If only one line is too many, the line takes no more room than the remark about it would.
     const std::size_t shown = alike.size() <= kMaxAlike + 1 ? alike.size() : kMaxAlike;
     for (std::size_t n = 0; n < shown; ++n) {
       result.push_back(*alike[n]);

@@ -24,17 +24,17 @@ namespace unflex::app {
 [[nodiscard]] std::string coloured_error(const Error& error);
 
 // Lines of one kind differ only in place, numbers and quoted text. Gives the first few lines of
-// each kind and how many more there are, then how many of `total` are left. `what` names the lines,
-// and may say where all of them are.
+// each kind and the number of further ones, then the number of `total` lines that are left. `what`
+// names the lines, and may say where all of them are.
 [[nodiscard]] std::vector<std::string> summarised(const std::vector<std::string>& lines,
                                                   std::size_t total, std::string_view what);
 
-// What a command says while it works. Each message goes to stderr at once and is kept as well, for
-// a log and for those who started the work.
+// The messages of a command while it works. Each message goes to stderr at once. It is also kept,
+// for a log and for whoever started the work.
 class Console {
  public:
-  // fd: where messages go, −1 to keep them only. What cannot be written there is lost.
-  // A terminal gets colours, unless the user does not want any.
+  // fd: where messages go; −1: they are only kept. A message that cannot be written is lost. A
+  // terminal gets colours, unless the user does not want any.
   explicit Console(int fd = platform::kStandardError);
 
   void line(std::string_view text);

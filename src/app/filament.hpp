@@ -18,7 +18,7 @@ namespace unflex::app {
 [[nodiscard]] std::optional<std::string> filament_profile(const RunConfig& config,
                                                           const machine::Settings& settings);
 
-// Fits the input, if the settings ask for that. nullopt: they do not. Errors are also those of the
+// Fits the input, if the settings ask for it. nullopt: they do not. Errors include those of the
 // profile.
 [[nodiscard]] Result<std::optional<filament::FittedPrint>> fit_to_filament(
     const RunConfig& config, const machine::Settings& settings, Input& input);

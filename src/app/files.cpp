@@ -19,15 +19,15 @@ namespace {
 
 constexpr std::size_t kBlockBytes = std::size_t{1} << 16U;
 
-// How often a wait is interrupted to see whether a signal has come just before it.
+// The longest single wait. After it the program looks for a signal that came just before the wait.
 constexpr std::chrono::milliseconds kPatience{50};
 
-// Whether to try again what has failed. A signal that does not end the program (a resized window)
-// must not end a read either. A stream may be set not to block, for the sake of someone who shares
-// it; then `wait` waits for it.
+// Whether to repeat a call that has failed. A signal that does not end the program (a resized
+// window) must not end a read. A stream may be set not to block, because another process that
+// shares it wants that. Then `wait` waits for the stream.
 bool try_again(int fd, bool (*wait)(int, std::chrono::milliseconds)) {
   if (errno == EAGAIN) {
-    static_cast<void>(wait(fd, kPatience));  // an error shows when it is tried again
+    static_cast<void>(wait(fd, kPatience));  // the repeated call shows any error
     errno = EINTR;
   }
   return errno == EINTR && platform::ending_signal() == 0;

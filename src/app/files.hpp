@@ -26,7 +26,7 @@ class TemporaryFile {
   // Removes temporary files whose process was killed. False if some are left: they are in use,
   // perhaps by processes that are about to end.
   static bool remove_abandoned(const std::string& folder);
-  // From here on the file is someone else's, and is not removed.
+  // Gives the file away. From here on it is not removed.
   void release();
 
  private:
@@ -37,8 +37,8 @@ class TemporaryFile {
   long owner_ = 0;
 };
 
-// What can be read next, empty at the end, or the errno of what went wrong; EINTR only if a signal
-// asked the program to end.
+// The next bytes; empty at the end. The error is an errno; EINTR only if a signal asked the program
+// to end.
 [[nodiscard]] tl::expected<std::string, int> read_some(int fd);
 
 // write_all() and copy_all() return 0 or the errno of what went wrong; EINTR only if a signal asked
@@ -49,8 +49,8 @@ class TemporaryFile {
 // Why a temporary file cannot be made or written, for messages.
 [[nodiscard]] std::string temporary_error_text(int error);
 
-// The name itself; for "-" a name of the file that descriptor `fd` was redirected to; "" for other
-// streams.
+// The name itself. For "-" it is a name of the file that descriptor `fd` was redirected to, or ""
+// for other streams.
 [[nodiscard]] std::string name_of_file(const std::string& name, int fd);
 
 }  // namespace unflex::app

@@ -13,7 +13,7 @@ namespace unflex::app {
 namespace {
 
 constexpr std::string_view kPrefix = "SLIC3R_";
-// The beginning of variables that are no settings.
+// The prefix of variables that are not settings.
 constexpr std::string_view kScriptPrefix = "SLIC3R_PP_";
 constexpr std::string_view kFileHost = "File";
 

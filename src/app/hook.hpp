@@ -1,4 +1,4 @@
-// unflex as a slicer's post-processing script: what the slicer tells by its environment.
+// unflex as a slicer's post-processing script: the facts that the slicer gives in the environment.
 #pragma once
 
 #include <optional>
@@ -10,8 +10,8 @@
 
 namespace unflex::app {
 
-// What PrusaSlicer and its relatives set for their scripts: every setting as SLIC3R_<KEY>, spelt as
-// in the settings block of the G-code, and beside these
+// Variables that PrusaSlicer and its relatives set for their scripts. Every setting is
+// SLIC3R_<KEY>, spelt as in the settings block of the G-code. Further variables:
 //   SLIC3R_PP_HOST         "File", or the kind of print host the file is uploaded to
 //   SLIC3R_PP_OUTPUT_NAME  where the file goes when the scripts are done: a path, or a name on the
 //                          host. What scripts are given is a temporary file.
@@ -24,10 +24,10 @@ struct Slicer {
 // Reads the environment of the process.
 [[nodiscard]] Slicer read_slicer();
 
-// What was asked for, completed by what a slicer that has started the program says: `compensate
-// --in-place` takes the slicer's settings, calls the print by its final name, and a report that is
-// only a suffix (".html") stands beside the final file. Other commands do not look at the slicer.
-// An error of kind usage if there is no such place.
+// The configuration, completed by the facts of a slicer that has started the program. `compensate
+// --in-place` takes the slicer's settings and calls the print by its final name. A report that is
+// only a suffix (".html") stands beside the final file. Other commands ignore the slicer. An error
+// of kind usage if the report has no such place.
 [[nodiscard]] Result<RunConfig> with_slicer(RunConfig config, const Slicer& slicer);
 
 }  // namespace unflex::app

@@ -21,7 +21,8 @@ using hotend::Rule;
 constexpr std::array kRules = {Rule::simc_pid, Rule::simc_pi,    Rule::zn_pid,
                                Rule::zn_pi,    Rule::cohen_coon, Rule::tyreus_luyben};
 
-// The rule for a test, from which Skogestad's cannot be had: of the others it overshoots least.
+// The rule for a test. Skogestad's rule cannot be had from a test. This one overshoots least of the
+// others.
 constexpr Rule kRuleOfTest = Rule::tyreus_luyben;
 constexpr double kUsualTarget_c = 210.0;
 constexpr double kUsualFlow_mm3_s = 10.0;
@@ -79,7 +80,7 @@ Status read_log(const RunConfig& config, HotendTuning& tuning) {
   return {};
 }
 
-// The model of the printer file, where nobody need know a resonance.
+// Reads the model from the printer file, which need not have a resonance.
 Status read_printer(const RunConfig& config, HotendTuning& tuning) {
   const Result<machine::Settings> settings = machine::load(config.printer_file, config.overrides);
   if (!settings) {
@@ -103,7 +104,8 @@ Status read_printer(const RunConfig& config, HotendTuning& tuning) {
   return {};
 }
 
-// Whether the heater can bring the plant to the target, and what filament takes there.
+// Sets the target and the load of the filament there. An error if the heater cannot reach the
+// target.
 Status set_target(const RunConfig& config, HotendTuning& tuning) {
   const hotend::Plant& plant = *tuning.plant;
   tuning.target_c = config.hotend.target_c.value_or(kUsualTarget_c);
@@ -134,8 +136,8 @@ Status set_target(const RunConfig& config, HotendTuning& tuning) {
   return {};
 }
 
-// The gains of all rules, and what they do. A rule that cannot be had is an error only if it is the
-// chosen one.
+// Computes the gains of all rules and their simulated responses. A rule that cannot be had is an
+// error only if it is the chosen one.
 Status tune_by_rules(HotendTuning& tuning) {
   for (const Rule rule : kRules) {
     const Result<hotend::Gains> gains =

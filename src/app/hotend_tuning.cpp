@@ -24,7 +24,7 @@ using hotend::PlantFit;
 using hotend::Response;
 using report::Json;
 
-// What a controller does is recorded more densely than anyone can see.
+// Time between drawn points. A simulated response is recorded more densely than anyone can see.
 constexpr double kDrawnStep_s = 1.0;
 // Half the width of an interval that holds the truth in 95 of 100 cases, in standard errors.
 constexpr double kErrorsOf95 = 1.96;
@@ -41,7 +41,7 @@ Interval interval_of(const Estimate& estimate, bool is_positive) {
   return {is_positive ? std::max(low, 0.0) : low, estimate.value + half};
 }
 
-// A value of the model as it is shown. Without a log nothing is known of its error.
+// A value of the model as it is shown. Its error is not known without a log.
 struct ModelRow {
   std::string_view key;  // of the printer file
   std::string_view name;
@@ -68,7 +68,7 @@ std::string value_text(const ModelRow& row) {
   const std::string text = row.estimate.error > 0.0
                                ? number_text(row.value, 2.0 * kErrorsOf95 * row.estimate.error)
                                : fmt::format("{:.5g}", row.value);
-  // A printer file takes no dead time of 0, however wide its interval is.
+  // A wide interval may round the dead time to 0, which a printer file does not take.
   const bool is_lost = row.value != 0.0 && text.find_first_of("123456789") == std::string::npos;
   return is_lost ? fmt::format("{:.1g}", row.value) : text;
 }
@@ -142,7 +142,7 @@ std::string settled_text(const Response& step) {
   return step.settled_s ? fmt::format("{:.0f} s", *step.settled_s) : std::string("never");
 }
 
-// A value for each second, up to where nothing happens any more.
+// One value for each second, up to the time after which nothing changes any more.
 struct Drawn {
   std::vector<double> time_s;
   std::vector<double> temperature_c;

@@ -1,4 +1,4 @@
-// What `hotend` finds, and how it tells it: as text, JSON and a page.
+// The result of `hotend`, and its output as text, JSON and a page.
 #pragma once
 
 #include <optional>
@@ -42,13 +42,13 @@ struct HotendTuning {
   std::optional<hotend::Plant> plant;  // none for a test, and for a log that carries none
   std::optional<hotend::Ultimate> ultimate;
   std::optional<double> heater_w;
-  hotend::Rule rule = hotend::kDefaultRule;  // that was chosen
+  hotend::Rule rule = hotend::kDefaultRule;  // the chosen one
   double target_c = 0.0;
   std::optional<HotendLoad> load;
   std::vector<RuleOutcome> rules;  // all that can be had; empty if the log is refused
   std::vector<std::string> warnings;
 
-  // The chosen one, which is there unless the log is refused.
+  // The outcome of the chosen rule. It is there unless the log is refused.
   [[nodiscard]] const RuleOutcome* chosen() const;
 };
 

@@ -1,4 +1,4 @@
-// What `unflex identify` found, for people, for programs and as a page.
+// The result of `unflex identify`, for people, for programs and as a page.
 #pragma once
 
 #include <map>
@@ -15,7 +15,8 @@ struct IdentifiedRecord {
   std::string name;
   identify::Axis axis = identify::Axis::x;
   identify::RecordFit fit;
-  // What Klipper's calibration would set up for the record; unset: it is no spectrum of an axis.
+  // The shaper that Klipper's calibration would set up for the record. Unset: the record is not the
+  // spectrum of an axis.
   std::optional<rivals::FittedShaper> shaper;
 };
 
@@ -24,14 +25,14 @@ struct Identification {
   // From all trusted records of an axis. An axis without one is missing.
   std::map<identify::Axis, identify::AxisModel> axes;
   std::vector<std::string> warnings;  // "file: warning: …"
-  bool is_second = false;  // the modes are those behind the ones that are compensated for
+  bool is_second = false;             // the modes lie behind those that are already compensated for
   std::vector<std::string> refusals;  // "file: …", of axes without a trusted record
 };
 
 // The lines to paste into a printer file.
 [[nodiscard]] std::string snippet(const Identification& identification);
 
-// What the lines say, as overrides: "key=value".
+// The settings of the snippet as overrides: "key=value".
 [[nodiscard]] std::vector<std::string> dynamics_overrides(const Identification& identification);
 
 [[nodiscard]] std::string identification_text(const Identification& identification);

@@ -24,7 +24,7 @@ std::string shaper_text(const rivals::FittedShaper& shaper) {
   return fmt::format("{} {:.1f} Hz", dynamics::name(shaper.kind), shaper.freq_hz);
 }
 
-// What the shaper leaves of a vibration: all of it is as high as the record.
+// The part of a vibration that the shaper leaves. The whole vibration is as high as the record.
 report::PlotCurve shaper_curve(const rivals::FittedShaper& shaper, const Curve& curve) {
   const std::vector<double> measured = heights(curve, curve.measured);
   const double all = *std::ranges::max_element(measured);
@@ -39,8 +39,8 @@ report::PlotCurve shaper_curve(const rivals::FittedShaper& shaper, const Curve& 
   return drawn;
 }
 
-// all: the parts of the fit. Otherwise what was measured, what the model makes of it, and what
-// Klipper's shaper would leave.
+// all: draws the parts of the fit. Otherwise draws the measurement, the model's curve, and the
+// vibration that Klipper's shaper would leave.
 std::string figure(const IdentifiedRecord& record, bool all) {
   const Curve& curve = record.fit.curve;
   if (curve.x.empty()) {
@@ -127,7 +127,7 @@ const IdentifiedRecord* record_of(const Identification& identification, identify
   return record == identification.records.end() ? nullptr : &*record;
 }
 
-// What was found in one sentence and one picture an axis, and the lines to paste.
+// The findings in one sentence and one picture for each axis, and the lines to paste.
 std::string answer_card(const Identification& identification) {
   std::string found;
   std::string pictures;

@@ -1,4 +1,4 @@
-// What the text and the page of an identification share.
+// Parts that the text and the page of an identification share.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 
 namespace unflex::app {
 
-// With as many digits as its interval leaves sure.
+// The estimate with the digits that its interval leaves certain.
 [[nodiscard]] std::string estimate_text(const identify::Estimate& e);
 // "44.9 to 45.9".
 [[nodiscard]] std::string interval_text(const identify::Estimate& e);
@@ -33,8 +33,8 @@ struct Trace {
   report::Stroke stroke = report::Stroke::solid;
 };
 
-// What was measured and what the model says of it: as a whole, each mode alone, noise, and what is
-// left.
+// Curves of the measurement and the model: the whole model, each mode alone, noise, and the
+// residual.
 [[nodiscard]] std::vector<Trace> traces_of(const IdentifiedRecord& record);
 
 }  // namespace unflex::app

@@ -32,8 +32,8 @@ Result<std::string> read_record(const std::string& name) {
   return input ? input->read_all() : Result<std::string>(tl::unexpected(input.error()));
 }
 
-// The axis of a record: the one that its name tells, the one that the user gives, or the one along
-// which it moved more.
+// The axis of a record. Its name tells the axis, or the user gives it. Otherwise it is the axis
+// with more motion.
 Result<identify::Axis> axis_of(const IdentifyConfig& config, const identify::DataSet& set,
                                Identification& all) {
   if (set.axis) {
@@ -113,7 +113,7 @@ Status add_tower(const IdentifyConfig& config, Identification& all) {
   return {};
 }
 
-// One model for each axis. A record that carries none is left out where others do.
+// Makes one model for each axis. A record without a model is left out if other records have one.
 void combine_records(Identification& all) {
   std::map<identify::Axis, std::vector<identify::AxisModel>> by_axis;
   for (const IdentifiedRecord& record : all.records) {
@@ -187,7 +187,7 @@ std::vector<identify::ModeOfAxis> modes_of(const machine::AxisDynamics& dynamics
   return modes;
 }
 
-// The settings for what needs the axes: those of a guess are refused.
+// The settings for work that needs the axes. Settings that rest on a guess are refused.
 Result<machine::Settings> settings_of(const RunConfig& config) {
   return machine::load(config.printer_file, config.overrides).and_then(without_guess);
 }
@@ -223,7 +223,7 @@ Result<ExitCode> make_test(const RunConfig& config, Console& console) {
       .map([&] { return outcome->verdict; });
 }
 
-// The records' configuration with what the printer file says of the known modes.
+// The configuration of the records, with the known modes from the printer file.
 Result<IdentifyConfig> with_known(const RunConfig& config) {
   IdentifyConfig result = config.identify;
   if (result.second) {

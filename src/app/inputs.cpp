@@ -76,7 +76,7 @@ Result<Input> Input::open(const std::string& name) {
     return fail(ErrorKind::input, place, "is a directory, not a G-code file");
   }
   Input input(name, std::move(fd), *state);
-  // Even a file on stdin need not stand at its start, so it is copied too.
+  // A file on stdin is copied too, because it need not stand at its start.
   input.is_stream_ = is_stdin || state->kind != platform::FileKind::file;
   return input;
 }
@@ -180,7 +180,7 @@ Status Input::make_seekable() {
   return is_stream_ || kind_ != container::Kind::text ? copy_text() : close_file();
 }
 
-// A file is read by its name from here on. Open, it could not be replaced on Windows.
+// From here on a file is read by its name. Windows could not replace it while it is open.
 Status Input::close_file() {
   if (!is_stream_ && !is_copied_) {
     fd_ = FileDescriptor();
@@ -190,7 +190,7 @@ Status Input::close_file() {
 
 Status Input::replace_text(const std::function<Status(const Write&)>& make) {
   const std::string directory = platform::temporary_directory();
-  // Without a name, nothing is left of the copy, whatever happens.
+  // A copy without a name cannot be left behind, whatever happens.
   tl::expected<FileDescriptor, int> copy = platform::open_unnamed_file(directory);
   if (!copy) {
     return fail(ErrorKind::internal, {directory, 0},

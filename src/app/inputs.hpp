@@ -25,30 +25,30 @@ class Input {
   // A text that is in no file, under the name that messages call it.
   [[nodiscard]] static Result<Input> of_text(const std::string& name, std::string_view text);
 
-  // Copies what cannot be read twice (stdin, pipes), and the text of what is packed, to a temporary
-  // file without a name.
+  // Makes the input a file that can be read twice. Copies stdin, pipes, and the text of packed
+  // inputs to a temporary file without a name.
   [[nodiscard]] Status make_seekable();
 
-  // Copies like make_seekable(), except text and gzip in a stream, which can be read once as they
-  // come.
+  // Copies like make_seekable(), but leaves text and gzip in a stream, since they can be read once
+  // as they come.
   [[nodiscard]] Status make_readable();
 
-  // Puts another text in the place of the input's: what `make` writes with the function that it is
-  // given, to a temporary file without a name.
+  // Replaces the input's text. `make` gets a function and writes the new text with it, to a
+  // temporary file without a name.
   using Write = std::function<Status(std::string_view)>;
   [[nodiscard]] Status replace_text(const std::function<Status(const Write&)>& make);
 
-  // What the input is packed in, and what a binary file says beside its G-code. Both are known once
-  // the input was made readable or seekable.
+  // The packing of the input, and the metadata of a binary file. Both are known once the input was
+  // made readable or seekable.
   [[nodiscard]] container::Kind kind() const { return kind_; }
   [[nodiscard]] const std::optional<container::Metadata>& metadata() const { return metadata_; }
 
-  // What can be seen now of the print. From a stream its head is taken; head() gives it back, as
-  // packed as it was. What stream_fd() still gives comes after it.
+  // The text of the print that can be seen now. From a stream this takes the first bytes. head()
+  // gives these bytes, still packed if they were packed. stream_fd() gives the bytes after them.
   [[nodiscard]] Result<machine::PrintText> look();
   [[nodiscard]] const std::string& head() const { return head_; }
 
-  // Checks that the file is still what it was when it was opened. If not, what was read may be of
+  // Checks that the file is still the one that was opened. If it has changed, the text may be of
   // two files and is no base for a result: an error of kind input.
   [[nodiscard]] Status check_unchanged() const;
 
@@ -58,10 +58,10 @@ class Input {
   // The descriptor of an input that cannot be read twice, to read it once; −1 for other inputs.
   [[nodiscard]] int stream_fd() const { return is_stream_ && !is_copied_ ? fd_.get() : -1; }
 
-  // Where to read the input, as long as this object lives, and what the user calls it.
+  // Where to read the input, as long as this object lives, and the user's name for it.
   [[nodiscard]] std::shared_ptr<TextStore> text() const;
   [[nodiscard]] const std::string& name() const { return name_; }
-  // Messages call the input so from here on.
+  // Sets the name of the input in messages from here on.
   void call(std::string name) { name_ = std::move(name); }
 
  private:
@@ -70,7 +70,7 @@ class Input {
 
   // Reads as far as it takes to know kind_.
   [[nodiscard]] Status look_at_kind();
-  // What can be read next, empty at the end.
+  // The next bytes of the input; empty at the end.
   [[nodiscard]] Result<std::string> read_block() const;
   Status close_file();
   // Copies all of it as text to a temporary file, which takes the input's place.

@@ -1,4 +1,4 @@
-// What `unflex inspect` tells, for people and for programs.
+// The output of `unflex inspect`, for people and for programs.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// A file to which the program adds what it has said each time, since slicers show little of it.
+// A file to which the program adds its messages of each run, since slicers show few of them.
 #pragma once
 
 #include <string>

@@ -25,7 +25,7 @@ namespace {
 using identify::Axis;
 using identify::DataSet;
 
-// An axis as one record tells of it.
+// An axis as one record describes it.
 struct KnownAxis {
   std::string name;
   std::optional<identify::AxisModel> model;  // missing if the record carries none
@@ -45,7 +45,7 @@ KnownAxis known_axis(const DataSet& set, Axis axis, const identify::Sweep& sweep
   return known;
 }
 
-// The records of an axis that stand for what is known and for the machine as it is.
+// Two records of an axis: the one that is known, and the one that shows the machine as it is.
 struct Pair {
   const KnownAxis* known = nullptr;
   const KnownAxis* machine = nullptr;
@@ -53,7 +53,7 @@ struct Pair {
   std::vector<dynamics::Mode> truth;
 };
 
-// truth: of the machine's record if it is at hand, since the fit takes seconds.
+// truth: a fit to the machine's record if it is at hand, since the fit takes seconds.
 std::optional<Pair> paired(const KnownAxis& known, const KnownAxis& machine,
                            std::optional<std::vector<dynamics::Mode>> truth = std::nullopt) {
   if (!known.model) {
@@ -68,7 +68,7 @@ std::optional<Pair> paired(const KnownAxis& known, const KnownAxis& machine,
              : std::nullopt;
 }
 
-// The last record with a model, on the machine that an independent fit to it tells of.
+// The last record with a model. The machine is an independent fit to the same record.
 std::optional<Pair> alone(const std::vector<KnownAxis>& records) {
   for (auto record = records.rbegin(); record != records.rend(); ++record) {
     if (std::optional<Pair> pair = paired(*record, *record)) {
@@ -78,8 +78,8 @@ std::optional<Pair> alone(const std::vector<KnownAxis>& records) {
   return std::nullopt;
 }
 
-// The last two records: the first is known, and the other one tells of the machine. `own` is that
-// of alone().
+// The last two records. The first is the known one, the second shows the machine. `own` is the
+// result of alone().
 std::optional<Pair> across(const std::vector<KnownAxis>& records, const Pair& own) {
   for (std::size_t i = records.size(); i > 1; --i) {
     const KnownAxis& machine = records[i - 1];

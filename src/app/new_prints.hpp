@@ -1,4 +1,4 @@
-// What comes into a folder that is watched.
+// New prints in a folder that is watched.
 #pragma once
 
 #include <map>
@@ -11,11 +11,11 @@
 
 namespace unflex::app {
 
-// Finds prints that are new, that have changed, or whose printer file has changed. A print is taken
-// once it has stayed as it is from one look to the next, since an upload takes time.
+// Finds prints that are new or have changed, or whose printer file has changed. A print is taken
+// once it is unchanged from one look to the next, since an upload takes time.
 class NewPrints {
  public:
-  // Leaves the prints to be worked on now, and what has not been told yet. printer_file: for
+  // Keeps only the prints to work on now, and the remarks not yet reported. printer_file: for
   // prints that have none of their own.
   void keep_new(BatchFiles& files, const std::optional<std::string>& printer_file);
 

@@ -20,7 +20,7 @@ tl::unexpected<Error> refuse(const std::string& name, std::string message) {
   return fail(ErrorKind::usage, {name, 0}, std::move(message));
 }
 
-// The directory a file is to be written in, or what speaks against it.
+// The directory that a file is to be written in, or the error that forbids it.
 Result<std::string> directory_for(const std::string& name, const std::string& target) {
   const std::string parent = platform::folder_of(target);
   std::string directory = parent.empty() ? "." : parent;
@@ -32,7 +32,7 @@ Result<std::string> directory_for(const std::string& name, const std::string& ta
   return directory;
 }
 
-// What the name leads to: the file to replace, or an empty name for a stream.
+// The target of the name: the file to replace, or an empty name for a stream.
 Result<std::string> find_target(const std::string& name) {
   if (name == kStandardStream) {
     return std::string();
@@ -183,8 +183,8 @@ Status Output::replace_target() {
   platform::note_result();
   const std::string directory = platform::folder_of(made.path());
   (packed_ ? *packed_ : temporary_).release();
-  // The new name itself must survive a power cut. If the directory cannot be put on the disk, it is
-  // done all the same.
+  // The new name itself must survive a power cut. If the directory cannot be put on the disk, the
+  // result counts as written all the same.
   platform::sync_folder(directory);
   return {};
 }
@@ -211,7 +211,7 @@ Status Output::copy_to_stream() {
     return opened;
   }
   const int error = copy_all(source.get(), stream_.get());
-  stream_ = FileDescriptor();  // closed, so that the reader learns that this was all
+  stream_ = FileDescriptor();  // closed, so that the reader sees the end
   if (error != 0) {
     return cannot_write(error);
   }

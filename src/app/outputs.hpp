@@ -29,13 +29,13 @@ class Output {
   [[nodiscard]] container::Kind kind() const { return kind_; }
   [[nodiscard]] bool is_stream() const { return target_.empty(); }
 
-  // Where to write until then, always text.
+  // Where to write before commit(); always text.
   [[nodiscard]] const std::string& path() const { return temporary_.path(); }
   [[nodiscard]] Status write(std::string_view text);
 
-  // The descriptor of a stream: the caller writes to it at once, packed as asked, and does not
-  // commit(). −1 for a file, and for binary G-code, which begins with what is known last. Errors
-  // are those of commit().
+  // The descriptor of a stream. The caller writes to it at once, packed as asked, and does not
+  // commit(). −1 for a file. −1 also for binary G-code, whose beginning is known last. Errors are
+  // those of commit().
   [[nodiscard]] Result<int> stream_fd();
 
   // Does the part of commit() that takes room on the disk, since that part fails most often.

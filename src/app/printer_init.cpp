@@ -72,7 +72,7 @@ Result<Identification> identified(const RunConfig& config, Console& console) {
   return found;
 }
 
-// The records are where the keys that they give came from.
+// Names the records as the origin of the keys that they give.
 void name_records(const Identification& found, machine::Settings& settings) {
   for (const auto& [axis, model] : found.axes) {
     std::string names;

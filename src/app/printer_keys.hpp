@@ -1,4 +1,4 @@
-// `unflex printer keys`: what there is to set.
+// `unflex printer keys`: the list of all settings.
 #pragma once
 
 #include <string>
@@ -8,8 +8,8 @@
 
 namespace unflex::app {
 
-// Every key that a printer file and --set take. A key's line begins with its name, lines that tell
-// more of it begin with a space: the completions of shells read it.
+// Every key that a printer file and --set take. A key's line begins with its name. Further lines
+// about the key begin with a space. The completions of shells read this text.
 [[nodiscard]] std::string keys_text();
 
 [[nodiscard]] Result<ExitCode> run_printer_keys();

@@ -1,4 +1,4 @@
-// `unflex printer macros`: what lets a pause wait for the end of a compensated run.
+// `unflex printer macros`: macros that let a pause wait for the end of a compensated run.
 #pragma once
 
 #include "unflex/app/run_config.hpp"

@@ -55,8 +55,8 @@ class OneEstimate final : public SignalledProgress {
   std::string told_;  // the stage that was told of
 };
 
-// The bar's text for a terminal of `columns`, without control characters. left: the time left, as
-// text, or empty; it gives way where there is no room.
+// The bar's text for a terminal of `columns`, without control characters. left: the text of the
+// time left, or empty. It is dropped if there is no room.
 [[nodiscard]] std::string bar_text(std::string_view stage, double fraction, std::string_view left,
                                    std::size_t columns);
 

@@ -1,4 +1,4 @@
-// What commands do alike: work under a progress bar, and hand on what came of it.
+// Steps that commands share: work under a progress bar, and the delivery of results.
 #pragma once
 
 #include <memory>
@@ -41,11 +41,11 @@ auto with_progress(const RunConfig& config, Work work)
 // The settings, or an error if they rest on a guess.
 [[nodiscard]] Result<machine::Settings> without_guess(machine::Settings settings);
 
-// What is odd about the settings, and what in them is a guess.
+// Warnings about odd settings and about guesses among them.
 [[nodiscard]] std::vector<std::string> setting_warnings(const machine::Settings& settings);
 
-// What becomes of the output after an error, for messages. passed_on: the output has gone to a
-// stream as it came.
+// The fate of the output after an error, for messages. passed_on: the output has already gone to a
+// stream.
 [[nodiscard]] std::string_view consequence_of(bool passed_on);
 
 // With --strict, an error if there are warnings. They are then shown as errors.
@@ -55,7 +55,8 @@ auto with_progress(const RunConfig& config, Work work)
 // Puts remarks about the settings before those about the print.
 void add_setting_warnings(const machine::Settings& settings, std::vector<std::string>& warnings);
 
-// The summary goes to stdout, unless a result is there; then to stderr if someone is looking.
+// The summary goes to stdout. If a result goes there, the summary goes to stderr, but only to a
+// terminal.
 [[nodiscard]] Status print_summary(const RunConfig& config, std::string_view text,
                                    Console& console);
 

@@ -71,7 +71,7 @@ Result<ExitCode> run_inspect(const RunConfig& config, Console& console) {
       .map([] { return ExitCode::done; });
 }
 
-// What the command studies: the corner, or a print.
+// Runs the study that the command asks for: of the corner, or of a print.
 Result<study::Outcome> study_outcome(const RunConfig& config, std::optional<Workspace>& print) {
   const bool traces = config.report && config.report->ends_with(".html");
   if (!print) {
@@ -277,8 +277,7 @@ int run(const RunConfig& asked) {
   return code;
 }
 
-// Whether to do without the wide registers that the processor has, to show that it makes no
-// difference.
+// Whether to leave the processor's wide registers unused, to show that they make no difference.
 static bool prefers_two_lanes() {
   const char* const lanes = std::getenv("UNFLEX_LANES");
   return lanes != nullptr && std::string_view(lanes) == "2";

@@ -10,13 +10,13 @@ namespace {
 
 using Seconds = TimeLeft::Seconds;
 
-// How much has to be known of a stage.
+// The least time and share of a stage that must be known for an estimate.
 constexpr Seconds kLeastTime{3.0};
 constexpr double kLeastFraction = 0.03;
-// How far apart samples are at least. They bound the memory.
+// The least time between samples. It bounds the memory.
 constexpr Seconds kSampleInterval{0.5};
-// What an estimate may be off by before it is corrected: a share of what is left, but no less than
-// this, since near the end every share is short.
+// An estimate may be off by this share of the time left before it is corrected, but at least by
+// kTolerated, since near the end every share is short.
 constexpr double kToleratedShare = 0.15;
 constexpr Seconds kTolerated{3.0};
 
@@ -45,7 +45,7 @@ std::optional<Seconds> TimeLeft::update(std::string_view stage, double fraction,
   const Sample& since = samples_.front();
   const double gained = fraction - since.fraction;
   if (now - *start_ < kLeastTime || fraction - first_fraction_ < kLeastFraction || gained <= 0.0) {
-    // A stage that stands still for long says nothing, least of all what it said before.
+    // A stage that stands still gives no estimate, and its earlier estimate no longer holds.
     end_ = gained <= 0.0 ? std::nullopt : end_;
     return std::nullopt;
   }
@@ -67,7 +67,7 @@ void TimeLeft::forget_older_half(TimePoint now) {
 std::string time_left_text(Seconds left) {
   constexpr double kMinute = 60.0;
   constexpr double kStep = 5.0;
-  // Rounded up, so that nobody is told that nothing is left.
+  // Rounded up, so that the text never says that nothing is left.
   const double seconds = std::max(kStep, kStep * std::ceil(left.count() / kStep));
   if (seconds <= kMinute) {
     return fmt::format("{:.0f} s left", seconds);
@@ -76,7 +76,7 @@ std::string time_left_text(Seconds left) {
   if (minutes < kMinute) {
     return fmt::format("{:.0f} min left", minutes);
   }
-  // So long before the end, single minutes are made up.
+  // An hour or more before the end, single minutes would be made up.
   const double rounded = kStep * std::ceil(minutes / kStep);
   const double hours = std::floor(rounded / kMinute);
   return fmt::format("{:.0f} h {:.0f} min left", hours, rounded - kMinute * hours);

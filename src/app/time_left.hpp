@@ -9,16 +9,16 @@
 
 namespace unflex::app {
 
-// Judges by the later half of what is known of a stage, since parts of a print differ. What was
-// estimated counts down with the clock and is corrected only where it has become wrong, so that
-// the time does not jump about.
+// Judges by the later half of the known part of a stage, since parts of a print differ. An estimate
+// counts down with the clock. It is corrected only where it has become wrong, so that the time does
+// not jump about.
 class TimeLeft {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
   using Seconds = std::chrono::duration<double>;
 
-  // The estimate at `now`, or none while there is too little to judge by. fraction: what of the
-  // stage is done, negative if unknown. Another stage, or one that starts again, is judged anew.
+  // The estimate at `now`, or none while too little is known. fraction: the share of the stage that
+  // is done, negative if unknown. Another stage, or one that starts again, is judged anew.
   [[nodiscard]] std::optional<Seconds> update(std::string_view stage, double fraction,
                                               TimePoint now);
 

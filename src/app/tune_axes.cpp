@@ -20,8 +20,8 @@ using Known = std::array<tune::Knowledge, 2>;
 
 constexpr std::array kLetters = {'x', 'y'};
 
-// Relative error that a frequency may have which is given by hand or taken from the printer's own
-// shaper.
+// The relative error that a frequency may have if it is given by hand or taken from the printer's
+// own shaper.
 constexpr double kErrorOfGiven = 0.15;
 constexpr double kDampingErrorOfGiven = 0.05;
 
@@ -30,7 +30,7 @@ struct Printer {
   Known known;
 };
 
-// What the settings say of an axis. Several modes are more than a tower shows.
+// The settings' knowledge of an axis. Several modes are an error, since a tower shows only one.
 Result<tune::Knowledge> knowledge_of(const machine::Settings& settings, std::size_t axis) {
   const machine::AxisDynamics& dynamics = settings.dynamics[axis];
   const std::string section = fmt::format("dynamics.{}.", kLetters[axis]);
@@ -52,7 +52,7 @@ Result<tune::Knowledge> knowledge_of(const machine::Settings& settings, std::siz
   return known;
 }
 
-// The settings, for which nobody need know a frequency.
+// The settings. They need not give a frequency.
 Result<machine::Settings> load_settings(const RunConfig& config, const machine::PrintText* print) {
   machine::Sources sources{
       .print = print, .printer_file = config.printer_file, .overrides = config.overrides};
@@ -128,7 +128,7 @@ std::string edge_text(std::size_t axis, const tune::Trial& trial, const tune::Zo
              : std::string{};
 }
 
-// The printer after what its tower tells.
+// The printer with the values that its tower shows.
 Result<Printer> read_tower(const RunConfig& config, const std::string& text, std::string& summary) {
   const Result<tune::TowerRecord> record = tune::record_of(text, config.input);
   if (!record) {

@@ -65,8 +65,8 @@ class GreyPicture {
   std::string pixels_;
 };
 
-// The wall in light from one side: as bright as it slopes towards it. A smooth wall is of an even
-// grey.
+// The wall in light from one side. A point is as bright as the wall slopes towards the light, so a
+// smooth wall is evenly grey.
 std::string picture(const std::vector<std::vector<Relief>>& reliefs, std::size_t wall,
                     std::size_t bands) {
   constexpr double kBrightnessPerSlope = 14.0;
@@ -85,8 +85,8 @@ std::string picture(const std::vector<std::vector<Relief>>& reliefs, std::size_t
   return to_base64(grey.bmp());
 }
 
-// A wall as wide as it is: light where it is thicker, dark where it is thinner. Each row is a
-// band's ring, as far as its first side goes.
+// The width of a wall: light where it is thicker, dark where it is thinner. Each row is a band's
+// ring, as far as its first side goes.
 std::string width_picture(const std::vector<tune::RingWidths>& widths, double side_mm) {
   constexpr double kBrightnessPerShare = 1.2;
   const auto width = static_cast<std::size_t>(side_mm / tune::RingWidths::kBin_mm);

@@ -28,7 +28,7 @@ Result<std::string> read_text(const Input& input) {
   return text.str();
 }
 
-// The limits of the printer that a tower of another acceleration goes beyond.
+// The printer's own limits, if a tower of another acceleration goes beyond them.
 tune::AccelLimits own_limits(const machine::Settings& settings) {
   const std::array<double, 4> axes = settings.axis_max_accel_mm_s2();
   return {axes[0], axes[1], settings.print_accel_mm_s2(), settings.travel_accel_mm_s2()};
@@ -92,7 +92,8 @@ Status check_place(const machine::Settings& settings, const tune::Tower& tower,
   for (std::size_t axis = 0; axis < XY::kCount; ++axis) {
     const std::optional<machine::Range>& travel = settings.printer.travel_mm[axis];
     const double center_mm = codes.center_mm[axis];
-    // Where the tool may be is not known of every printer. The user's own print was there.
+    // The tool's travel is not known for every printer. Where it is unknown, the place of the
+    // user's own print is trusted.
     if (travel && (center_mm - half_mm < travel->min || center_mm + half_mm > travel->max)) {
       return fail(ErrorKind::usage,
                   fmt::format("the tower needs {:.0f} mm around {:.0f} mm, which "
@@ -214,7 +215,7 @@ Status write_tower(const RunConfig& config, const TowerSite& site, const tune::T
   if (Status placed = check_place(site.settings, tower, site.codes); !placed) {
     return placed;
   }
-  // Both are opened first, so that nothing is computed in vain.
+  // Output and page are opened first, so that nothing is computed in vain.
   Result<Output> output = Output::open(config.output);
   std::optional<Output> page;
   if (!output) {

@@ -1,4 +1,4 @@
-// What towers of all kinds share: the printer that they are for, the files that come of them.
+// Parts that towers of all kinds share: their printer, and the files that they give.
 #pragma once
 
 #include <functional>
@@ -38,10 +38,11 @@ using LoadSettings =
 // Whether somebody has given this key.
 [[nodiscard]] bool is_given(const machine::Settings& settings, const std::string& key);
 
-// What a tower's settings say of the printer.
+// The facts of the printer that a tower's settings hold.
 [[nodiscard]] tune::TowerPrinter tower_printer(const TowerSite& site);
 
-// Has the tower accelerate no more than this. The printer has its own limits back behind it.
+// Limits the tower's acceleration to most_mm_s2. Behind the tower the printer has its own limits
+// back.
 void lower_accel(const TowerSite& site, double most_mm_s2, tune::TowerPrinter& tower);
 
 // Compensates the bands and writes the tower to RunConfig::output, and the page that `page` makes

@@ -29,7 +29,8 @@ Result<machine::Settings> load_settings(const RunConfig& config, const machine::
       {.print = print, .printer_file = config.printer_file, .overrides = config.overrides});
 }
 
-// What the settings say. An advance by firmware was found without a dead time, so it is the sum.
+// The settings' knowledge of the hotend. An advance of the firmware was found without a dead time,
+// so it stands for the sum.
 tune::PressureKnowledge knowledge_of(const machine::Settings& settings) {
   tune::PressureKnowledge known;
   if (settings.pressure.advance_s) {

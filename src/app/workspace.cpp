@@ -16,8 +16,8 @@
 namespace unflex::app {
 namespace {
 
-// Checks that no two names lead to one file: the result would destroy what it was made from. So
-// would a stream that is redirected to such a file.
+// Checks that no two names lead to one file, since the result would destroy its own source. A
+// stream that is redirected to such a file would do so, too.
 Status check_distinct(const RunConfig& config) {
   const bool compensates = writes_print(config.command);
   const std::string input = name_of_file(config.input, platform::kStandardInput);

@@ -1,4 +1,5 @@
-// What a command on a print works with, opened and checked before the long work begins.
+// The files and settings of a command on a print. They are opened and checked before the long work
+// begins.
 #pragma once
 
 #include <optional>
@@ -22,13 +23,13 @@ struct Workspace {
   std::optional<Output> report;
 };
 
-// The settings in force for the print that is read. Nothing is compensated by a guess.
+// The settings in force for the print that is read. Settings that rest on a guess are refused.
 [[nodiscard]] Result<machine::Settings> load_settings(const RunConfig& config, Input& input);
 
 // Opens the prints, the output and the report, and reads the settings.
 [[nodiscard]] Result<Workspace> open_workspace(const RunConfig& config);
 
-// An error if a print was changed meanwhile, since that explains whatever else went wrong.
+// An error if a print was changed meanwhile, since the change explains any other failure.
 [[nodiscard]] Status check_inputs(const Workspace& space);
 
 // Has the output packed like the input, or as its name says.

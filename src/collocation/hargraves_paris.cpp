@@ -24,7 +24,7 @@ struct Entry {
   int column;
 };
 
-// What one interval needs at its two nodes and its middle.
+// Data of one interval at its two nodes and its middle.
 struct Interval {
   double t1 = 0.0;
   double t2 = 0.0;

@@ -99,7 +99,7 @@ PerKind<std::optional<RowBounds>> row_bounds(const ScaledWindow& scaled_window,
       result[i] = bounds;
     }
   };
-  // For the kinds whose bounds may differ from node to node.
+  // Sets the bounds of a kind at each node, for kinds whose bounds may differ from node to node.
   const auto set_each = [&](RowKind kind, const std::vector<double>& differing, const auto& of) {
     std::optional<RowBounds>& bounds = result[index_of(kind)];
     if (differing.empty() || !bounds) {

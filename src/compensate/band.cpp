@@ -11,13 +11,13 @@
 namespace unflex::compensate {
 namespace {
 
-// What the middle of a band has of its share; the edges have the rest.
+// The middle's part of the share of a band. The edges have the rest.
 constexpr double kMiddleShare = 1.0 / 3.0;
-// An edge leaves modes as they are where that changes it by less than this share of how far it is
+// An edge keeps a mode of the axis if this changes the edge by less than this share of its distance
 // from the axis. Each mode that edge and axis have in common makes the base cheaper to solve.
 constexpr double kNothing = 0.1;
 
-// How a mode answers the base at ω, before the gain.
+// A mode's response to the base at ω, before the gain.
 std::complex<double> response(const dynamics::Mode& mode, double omega_rad_s) {
   const double r = omega_rad_s / mode.omega_rad_s;
   const double loss = 2.0 * mode.zeta * r;
@@ -28,9 +28,9 @@ std::complex<double> response(const dynamics::Mode& mode, double omega_rad_s) {
   return {(left + loss * loss) / size, loss * (left - 1.0) / size};
 }
 
-// By how much two axes are apart after the speed of the base has stepped, which has a spectrum of
-// 1/ω²: the norm of their distance, up to a factor. Frequencies from a quarter of the slowest
-// mode's to twice the fastest's count.
+// The norm of the distance between two axes after a step of the base's speed, up to a factor. The
+// step has a spectrum of 1/ω². Frequencies from a quarter of the slowest mode's to twice the
+// fastest's count.
 double apart(std::span<const dynamics::Mode> a, std::span<const dynamics::Mode> b,
              const dynamics::FlexibleAxis& middle) {
   constexpr std::size_t kPlaces = 200;

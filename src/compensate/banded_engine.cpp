@@ -32,7 +32,7 @@ const char* name_of(RowKind kind) {
   }
 }
 
-// From the saved optimum without limits to that within them.
+// Takes the form from the saved optimum without limits to the optimum within them.
 InteriorPoint::Outcome solve_where_limits_count(FlatForm& form, InteriorPoint& interior_point,
                                                 const ScaledWindow& scaled,
                                                 const PerKind<std::optional<RowBounds>>& bounds,
@@ -42,14 +42,15 @@ InteriorPoint::Outcome solve_where_limits_count(FlatForm& form, InteriorPoint& i
   return interior_point.solve(form, scaled.nodes, bounds, strict, precision);
 }
 
-// Likewise. Rows bound the base in stretches alone. If it breaks a limit elsewhere, the stretches
-// grow and it is solved again.
+// Takes the form from the saved optimum without limits to the optimum within them. Rows bound the
+// base in stretches alone. If the base breaks a limit elsewhere, the stretches grow and the form is
+// solved again.
 InteriorPoint::Outcome solve_where_limits_count(StageForm& form, InteriorPoint& interior_point,
                                                 const ScaledWindow& scaled,
                                                 const PerKind<std::optional<RowBounds>>& bounds,
                                                 bool strict, const Precision& precision,
                                                 Stretches& stretches) {
-  // How far from a broken limit the base has to change because of it, at first.
+  // First guess of the distance from a broken limit within which the base has to change.
   constexpr double kReach_s = 0.01;
   auto reach = static_cast<std::size_t>(kReach_s / scaled.window->period_s) + 1;
   PerKind<bool> kinds{};
@@ -82,7 +83,7 @@ InteriorPoint::Outcome solve_where_limits_count(StageForm& form, InteriorPoint& 
     }
     reach *= 2;
   }
-  // Steps that are not quite Newton's may lead into a corner.
+  // Steps that are not quite Newton's may fail to converge. The whole window is solved then.
   form.restore();
   form.focus({});
   InteriorPoint::Outcome outcome =

@@ -70,7 +70,7 @@ std::vector<Reach> reaches_of(const RunWindow& window) {
   return result;
 }
 
-// An axis of a window: its program, factored, and how it comes to its aims. The program is factored
+// An axis of a window: its factored program, and the rule for its aims. The program is factored
 // once, since its matrix does not depend on the aims.
 class AimedAxis {
  public:
@@ -119,9 +119,9 @@ class AimedAxis {
     return q;
   }
 
-  // From the reference to the optimum.
+  // Takes the form from the reference to the optimum.
   void solve_first() { form_.step_to_optimum(); }
-  // From the optimum for the aims of before to that for aims at q.
+  // Takes the form from the optimum for the previous aims to the optimum for aims at q.
   void follow(const PairCoordinate& q) {
     set_aims(q);
     form_.follow_aims(node_aims_mm_, middle_aims_mm_);
@@ -131,7 +131,8 @@ class AimedAxis {
     return {nozzles_mm_.data(), form_.model_places(), of_pair_.data()};
   }
 
-  // The optimum for aims at q, which become the window's; nullopt if rounding keeps it away.
+  // The optimum for aims at q. They become the window's aims. nullopt if rounding keeps the form
+  // from the optimum.
   [[nodiscard]] std::optional<AxisSolution> finish(const PairCoordinate& q) {
     follow(q);
     const std::size_t places = form_.model_places();

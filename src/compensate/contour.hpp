@@ -14,8 +14,8 @@
 // where q̄_i is the mean of q over the pairs that hold model i. So solving both axes and finding q
 // anew alternate. In each round q goes farther than to the nearest place and keeps a share of its
 // last way, as a heavy ball does (B. T. Polyak, "Some methods of speeding up the convergence of
-// iteration methods", USSR Comput. Math. Math. Phys. 4 (1964) 1-17). What is left of the error
-// along the path falls slowly otherwise.
+// iteration methods", USSR Comput. Math. Math. Phys. 4 (1964) 1-17). Otherwise the remaining error
+// along the path falls slowly.
 #pragma once
 
 #include <array>
@@ -32,14 +32,14 @@ namespace unflex::compensate {
 [[nodiscard]] std::vector<PathVertex> path_of(const Course& course, double origin_s,
                                               double period_s);
 
-// The part of the path that a window of so many samples needs, from this sample on. reach: in half
-// node periods.
+// The part of the path that a window needs. The window begins at sample `first` and has `samples`
+// samples. reach: in half node periods.
 [[nodiscard]] std::vector<PathVertex> part_of(const std::vector<PathVertex>& path,
                                               std::size_t first, std::size_t samples, double reach);
 
-// Finds q, and sets aims and weights of the window. Its limits do not count for q. Returns the
-// optimum of each axis without limits, where rounding lets it be found.
+// The optimum of each axis without limits. nullopt: rounding keeps it from being found.
 using FreeSolutions = Axes<std::optional<AxisSolution>>;
+// Finds q, and sets the aims and weights of the window. The window's limits do not count for q.
 FreeSolutions aim(RunWindow& window);
 
 }  // namespace unflex::compensate

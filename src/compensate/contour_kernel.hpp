@@ -1,5 +1,5 @@
-// What contour.cpp does at each node in each round. Pairs lie in lanes, and so do the models that
-// they are made of (unflex/core/lanes.hpp).
+// The work of contour.cpp at each node in each round. Pairs lie in lanes, and so do their models
+// (unflex/core/lanes.hpp).
 //
 // Notation is that of contour.hpp.
 #pragma once
@@ -20,14 +20,14 @@ struct Edge {
   double inverse_square = 0.0;  // of its length; 0 if it has none
 };
 
-// From which vertex to which the path lies within a node's reach.
+// The range of vertices between which the path lies within a node's reach.
 struct Reach {
   std::size_t first = 0;
   std::size_t last = 0;
 };
 
-// A coordinate of q, and by how much it moved in the last round: of each pair at the nodes,
-// pair_places() numbers each.
+// A coordinate of q, and its change in the last round. Each node has pair_places() numbers, one
+// after the other for the pairs.
 struct PairCoordinate {
   LaneArray place_mm;
   LaneArray way_mm;
@@ -44,10 +44,10 @@ struct PairNozzles {
   const std::size_t* of_pair = nullptr;
 };
 
-// How an axis comes to its aims.
+// The rule by which the aims of an axis follow from q.
 struct AimRule {
   const double* reference_mm = nullptr;  // r, at nodes and middles
-  const double* along = nullptr;         // ε + λ likewise
+  const double* along = nullptr;         // ε + λ, at nodes and middles
   // Each pair's part in the aim of each model: pair_places() rows of `models` numbers.
   const double* parts = nullptr;
   std::size_t models = 0;
@@ -61,8 +61,8 @@ class ContourKernel {
   virtual ~ContourKernel() = default;
 
   [[nodiscard]] virtual std::size_t pair_places() const = 0;
-  // Takes q farther towards the places nearest to the nozzles: everywhere within the reach, or near
-  // where it was. Returns the longest way that a q went, mm.
+  // Moves each q towards the place nearest to its nozzle. The place is looked for everywhere within
+  // the reach, or near the last q. Returns the longest way that a q went, mm.
   virtual double follow(const std::vector<Edge>& edges, const std::vector<Reach>& reach,
                         const Axes<PairNozzles>& nozzle, bool everywhere, PairPlaces& q) const = 0;
   // Aims of each model at the nodes and in the middles behind them.
@@ -70,7 +70,7 @@ class ContourKernel {
                         LaneArray& node_aims_mm, LaneArray& middle_aims_mm) const = 0;
 };
 
-// The kernel for so many pairs, by the processor's registers.
+// The kernel for this number of pairs, by the processor's registers.
 [[nodiscard]] std::unique_ptr<ContourKernel> make_contour_kernel(std::size_t pairs);
 
 }  // namespace unflex::compensate

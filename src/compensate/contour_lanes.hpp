@@ -14,7 +14,7 @@ class LaneContour final : public ContourKernel {
 
   double follow(const std::vector<Edge>& edges, const std::vector<Reach>& reach,
                 const Axes<PairNozzles>& nozzle, bool everywhere, PairPlaces& q) const override {
-    // Edges that are looked at beside that of the round before.
+    // Number of edges looked at on either side of the edge found in the round before.
     constexpr std::size_t kAround = 2;
     const std::size_t places = pair_places();
     Lanes farthest = broadcast<Lanes>(0.0);
@@ -83,7 +83,8 @@ class LaneContour final : public ContourKernel {
         const std::size_t place = k * rule.models + kLanes * group;
         store(broadcast<Lanes>(r) + (1.0 / (1.0 + rule.along[2 * k])) * off,
               node_aims_mm.data() + place);
-        // In the middle between two nodes q is as far from r as on the average of both.
+        // In the middle between two nodes, the distance of q from r is the mean of the distances at
+        // both nodes.
         if (k > 0) {
           store(broadcast<Lanes>(rule.reference_mm[2 * k - 1]) +
                     (0.5 / (1.0 + rule.along[2 * k - 1])) * (before + off),
@@ -95,8 +96,8 @@ class LaneContour final : public ContourKernel {
   }
 
  private:
-  // How far q goes in a round: so many times the way to the nearest place, and this share of the
-  // way that it went in the round before.
+  // In a round q goes kStep times the way to the nearest place, plus the share kInertia of its way
+  // in the round before.
   static constexpr double kStep = 2.8;
   static constexpr double kInertia = 0.45;
 
@@ -116,7 +117,7 @@ class LaneContour final : public ContourKernel {
     return gathered<Lanes>(p[of[0]], p[of[1]], p[of[2]], p[of[3]]);
   }
 
-  // Returns how far.
+  // Moves q, and returns how far it went.
   [[nodiscard]] static Lanes go(const Lanes& nearest, std::size_t place, PairCoordinate& q) {
     const Lanes at = load<Lanes>(q.place_mm.data() + place);
     const Lanes way = kInertia * load<Lanes>(q.way_mm.data() + place) + kStep * (nearest - at);

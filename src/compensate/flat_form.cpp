@@ -14,7 +14,8 @@ constexpr std::size_t kFewestNodes = 8;
 constexpr double kSmallestOmegaH = 0.05;
 constexpr std::size_t kMiddle = 2;  // c_{k+2} is where p_k is, roughly
 
-// What rounds away here is lost to the whole form, so it is worked out to twice the precision.
+// Rounding errors of the stencils would affect the whole form, so stencils are computed to twice
+// the precision.
 using math::Pair;
 using PairStencil = std::array<Pair, kHalfBand + 1>;
 constexpr std::size_t kStates = 5;
@@ -300,7 +301,7 @@ bool FlatForm::factor(const PerKind<const double*>& weights) {
     }
   }
   tie_ends_of_hessian();
-  // Where weights differ by more than numbers have digits, rounding may make a pivot negative. A
+  // If weights differ by more than the precision of numbers, rounding may make a pivot negative. A
   // diagonal that is larger by 1e-15 to 1e-12 of itself makes it positive, and steps still lower
   // the cost.
   constexpr int kMostTries = 4;
@@ -316,7 +317,7 @@ bool FlatForm::factor(const PerKind<const double*>& weights) {
   return is_factored;
 }
 
-// Goes from the Hessian of all of c to that of the unknowns.
+// Turns the Hessian of all of c into the Hessian of the unknowns.
 void FlatForm::tie_ends_of_hessian() {
   const auto at = [&](std::size_t i, std::size_t j) {
     const std::size_t d = i < j ? j - i : i - j;

@@ -1,4 +1,4 @@
-// How a form of a window (FlatForm, StageForm) comes to its optimum without limits.
+// Steps of a form of a window (FlatForm, StageForm) to its optimum without limits.
 #pragma once
 
 #include <algorithm>

@@ -22,7 +22,7 @@
 
 namespace unflex::compensate {
 
-// When a solution counts as found.
+// The precision at which a solution counts as found.
 struct Precision {
   // The largest sλ summed over all sides, and the largest decrement left, as shares of the cost.
   double gap_share = 1e-8;
@@ -33,7 +33,7 @@ struct Precision {
   double feasibility = 1e-8;
 };
 
-// For who solves again and again on the way to something else.
+// The precision for callers that solve many windows as intermediate steps.
 inline constexpr Precision kRough{1e-4, 1e30, 1e-4};
 
 class InteriorPoint {

@@ -1,4 +1,4 @@
-// Which limits the program of a window has, their bounds at the nodes, and the rule by which limits
+// The limits in the program of a window, their bounds at the nodes, and the rule by which limits
 // are added. All engines share this.
 //
 // Most windows keep all limits by themselves, and bounds that the solution keeps anyway only cost
@@ -49,11 +49,11 @@ struct BaseBounds {
 // Where the base rests at node k, if it does.
 [[nodiscard]] std::optional<double> resting_base_mm(const AxisWindow& window, std::size_t k);
 
-// Which limits the trajectory breaks, between the nodes too.
+// The limits that the trajectory breaks, at the nodes or between them.
 [[nodiscard]] ActiveLimits broken(const dynamics::AxisTrajectory& base, const BaseLimits& limits,
                                   double period_s);
 
-// Which limits the trajectory breaks, the window's own limits at the nodes included.
+// The limits that the trajectory breaks, including the window's own limits at the nodes.
 [[nodiscard]] ActiveLimits broken(const dynamics::AxisTrajectory& base, const AxisWindow& window);
 
 // The limits in `active`, and those in `more`, which are broken in spite of them. Travel between

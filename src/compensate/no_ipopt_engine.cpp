@@ -1,4 +1,4 @@
-// Where the library is built without Ipopt.
+// Substitutes for the Ipopt engine in a library built without Ipopt.
 #include "unflex/compensate/axis_window.hpp"
 
 namespace unflex::compensate {

@@ -67,7 +67,7 @@ std::size_t around(const Course::Moves& moves, double period_s, const Setup& set
                                   period_s);
 }
 
-// One axis of a window, without what is given at the window's ends.
+// One axis of a window, without the conditions at the window's ends.
 AxisWindow make_axis(const AxisSetup& axis, const Setup& setup, double period_s,
                      std::vector<double> reference, std::vector<double> weight) {
   AxisWindow window;
@@ -165,7 +165,7 @@ std::vector<WindowSpan> cut(std::size_t nodes, const Setup& setup) {
 
 namespace {
 
-// How long base and nozzle need after an uneven motion until they go along with an even one.
+// The time after an uneven motion until base and nozzle follow an even one.
 double settling_s(const Setup& setup, double period_s) {
   // Zero if jerk is not limited. If acceleration is not limited, the ratio is not finite and counts
   // as no time.
@@ -331,7 +331,7 @@ void prepare(const Engine& divider, const WindowSpan& span, RunWindow& window) {
     static_cast<void>(aim(window));
   }
   if (window.shares_motors) {
-    // The solution counts for its limits alone.
+    // The solution is dropped. Only the limits that it has set in the window count.
     static_cast<void>(solve_with_shared_motors(divider, window));
   }
 }

@@ -9,7 +9,7 @@
 namespace unflex::compensate {
 namespace {
 
-// One train of pulses after the other.
+// The train of pulses that has the effect of both trains, one after the other.
 dynamics::ShaperPulses both(const dynamics::ShaperPulses& a, const dynamics::ShaperPulses& b) {
   if (a.empty() || b.empty()) {
     return a.empty() ? b : a;

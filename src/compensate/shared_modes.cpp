@@ -7,7 +7,7 @@
 namespace unflex::compensate {
 namespace {
 
-// What starts may differ by and yet be the same, mm.
+// Starts that differ by no more than this are the same, mm.
 constexpr double kSame_mm = 1e-9;
 
 bool are_alike(const SharedModes::Swing& a, const SharedModes::Swing& b) {

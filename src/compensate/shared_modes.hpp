@@ -1,8 +1,8 @@
 // The modes of all models of an axis, those that are alike counted once.
 //
-// A mode's motion does not depend on its gain, if that is taken off it: the part of the nozzle's
-// motion is the gain times that of a mode whose gain is 1. Models that have a mode in common
-// therefore share its motion, unless they begin with different ones.
+// A mode's part of the nozzle's motion is its gain times the motion of a mode whose gain is 1.
+// Models that have a mode in common therefore share its motion, unless the mode begins differently
+// in them.
 #pragma once
 
 #include <cstddef>

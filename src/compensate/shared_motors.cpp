@@ -1,6 +1,6 @@
-// Where both axes together want more than a motor has, each gets in proportion to what it wants.
-// What neither axis uses is divided evenly, and both are solved again. The solution before keeps
-// the new limits too, so no round is worse.
+// Where both axes together ask for more than a motor's limit, the limit is divided in proportion to
+// what each axis asks for. The part that neither axis uses is divided evenly. Then both axes are
+// solved again. The previous solution keeps the new limits too, so no round is worse.
 #include "shared_motors.hpp"
 
 #include <algorithm>
@@ -18,7 +18,7 @@ constexpr double kGain = 0.01;
 // A relative excess up to this is rounding.
 constexpr double kSlack = 1e-6;
 
-// What both axes do at the nodes: their velocities, or their accelerations.
+// A motion of both axes at the nodes: their velocities, or their accelerations.
 using Nodes = std::vector<double> dynamics::AxisTrajectory::*;
 
 bool is_solved(const AxisSolutions& solutions) {

@@ -93,7 +93,7 @@ void LaneStages<Lanes, V, W>::take_kept(std::size_t k) {
   }
 }
 
-// P from behind an interval to before it, and the interval's feedback.
+// Carries P back over an interval, and computes the interval's feedback.
 template <class Lanes, std::size_t V, std::size_t W>
 bool LaneStages<Lanes, V, W>::carry_cost_back(std::size_t k, const PerKind<const double*>& weights,
                                               StageArrays& at) {
@@ -159,7 +159,8 @@ bool LaneStages<Lanes, V, W>::carry_cost_back(std::size_t k, const PerKind<const
       in_base[0] + middle * middle_base_cross_[0],
       in_base[0] + in_base[1] + middle * middle_base_cross_[1],
       0.5 * in_base[0] + in_base[1] + in_base[2] + sum(of_accel) + middle * middle_base_cross_[2]};
-  // Feedback. Where it is prescribed, the base alone has any, so P_ss keeps what it has.
+  // Computes the feedback. A prescribed feedback has entries for the base alone, so it adds nothing
+  // to P_ss.
   double* const f = at.feedback.data() + k * state_size();
   double fb[3];
   double inverse = 0.0;
@@ -221,8 +222,8 @@ void LaneStages<Lanes, V, W>::carry_swing_back(const double* f, const LaneRow<La
   }
 }
 
-// Four modes' rows and four modes' columns of that. kCosts: whether some model has modes of both,
-// so that the stage's own cost has products of them.
+// Four modes' rows and four modes' columns of the new P_ss. kCosts: whether some model has modes of
+// both, so that the stage's own cost has products of them.
 template <class Lanes, std::size_t V, std::size_t W>
 template <bool kCosts>
 void LaneStages<Lanes, V, W>::carry_block_back(std::size_t a, std::size_t v, const double* f,

@@ -87,8 +87,8 @@ void StageForm::set_start() {
     start_basis_.setIdentity(n, n);
   }
   if (window_->end_base && arrays_.nodes == 2) {
-    // The only input cannot keep both b and ḃ. So b̈ at the first node is tied to the rest of that
-    // state.
+    // The only input cannot keep both b and ḃ at the end. So b̈ at the first node follows from b
+    // and ḃ there.
     first(accel) = 6.0 * (*window_->end_base - first(accel - 2)) - 4.0 * first(accel - 1);
     if (window_->start) {
       start_basis_.resize(n, 0);
@@ -116,7 +116,7 @@ bool StageForm::factor(const PerKind<const double*>& weights) {
   if (factored_.empty() || ++times_factored_ > kPatience) {
     return kernel_->factor(weights, arrays_) && factor_start();
   }
-  // The first one last, since the start needs its P.
+  // The first stretch comes last, since the start needs its P.
   for (auto range = factored_.rbegin(); range != factored_.rend(); ++range) {
     if (!kernel_->factor_between(range->first, range->last, weights, arrays_)) {
       return false;
@@ -125,7 +125,8 @@ bool StageForm::factor(const PerKind<const double*>& weights) {
   return factored_.front().first > 0 || factor_start();
 }
 
-// How long before a weighted row the feedback still differs from that without weights.
+// The number of nodes before a weighted row at which the feedback still differs from the feedback
+// without weights.
 std::size_t StageForm::lead_nodes() const {
   constexpr double kLead_s = 0.02;
   return static_cast<std::size_t>(kLead_s / window_->window->period_s) + 1;

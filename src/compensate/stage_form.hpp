@@ -55,10 +55,10 @@ class StageForm {
 
   // Prepares for steps. Also for focus(), if there are no weights.
   [[nodiscard]] bool factor(const PerKind<const double*>& weights);
-  // From now on rows have weights in these stretches alone, and factor() works on these, and on
-  // what lies closely before them. Elsewhere the feedback stays that without weights. Steps are
-  // then not quite Newton's, but they lead to the same optimum, since gradients are exact. An empty
-  // list: the whole window.
+  // From now on rows have weights in these stretches alone. factor() works on the stretches and on
+  // the nodes closely before them. Elsewhere the feedback without weights stays. Steps are then not
+  // quite Newton's, but they lead to the same optimum, since gradients are exact. An empty list:
+  // the whole window.
   void focus(const Stretches& stretches);
   void solve(const PerKind<const double*>& forces);
   [[nodiscard]] const double* row_steps(RowKind kind) const {
@@ -72,9 +72,9 @@ class StageForm {
   // For one set of aims after the other. Aims are in mm, of each model at the nodes and in the
   // middles behind them, model_places() numbers each.
   [[nodiscard]] std::size_t model_places() const { return kernel_->model_places(); }
-  // From the optimum for the aims of before to that for these.
+  // Goes from the optimum for the previous aims to the optimum for these.
   void follow_aims(const LaneArray& node_aims_mm, const LaneArray& middle_aims_mm);
-  // p of each model at the nodes, likewise.
+  // p of each model at the nodes, in mm, model_places() numbers each.
   void write_nozzles(LaneArray& nozzles_mm) const;
 
   void save();

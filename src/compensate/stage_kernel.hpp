@@ -1,4 +1,4 @@
-// What StageForm (stage_form.hpp) does at each stage, for all nodes of a window. Modes and models
+// The work of StageForm (stage_form.hpp) at each stage, for all nodes of a window. Modes and models
 // lie in lanes (unflex/core/lanes.hpp). There is a kernel for each number of lanes that is common,
 // whose loops the compiler unrolls, and one for any number.
 //
@@ -19,7 +19,7 @@
 
 namespace unflex::compensate {
 
-// How the modes go from node to node: A, a and β, each part for all modes.
+// The step of the modes from node to node: A, a and β, each part for all modes.
 struct ModeSteps {
   std::array<std::vector<double>, 4> own;  // A, by rows
   std::array<std::vector<double>, 2> by_accel;
@@ -31,7 +31,7 @@ struct ModeSteps {
   [[nodiscard]] std::size_t count() const { return own[0].size(); }
 };
 
-// What all stages of a window have in common.
+// Data that all stages of a window share.
 struct StageModel {
   ModeSteps modes;
   std::vector<SharedModes::Model> models;
@@ -40,10 +40,10 @@ struct StageModel {
   void clear();
 };
 
-// b' = b + ḃ + b̈/2 + j/6 and so on.
+// Coefficients of j in the next b, ḃ and b̈: b' = b + ḃ + b̈/2 + j/6 and so on.
 inline constexpr std::array<double, 3> kBaseByJerk = {1.0 / 6.0, 0.5, 1.0};
-// Before a base that rests at the last node: b, ḃ and b̈ at node N − 2 make the place where it will
-// rest, and so does the input of the interval before that node.
+// The coefficient of j in the next value of b + 2/3 ḃ + 1/6 b̈. If a base rests at the last node,
+// this sum is given at the node before it (stage_form.hpp).
 inline constexpr double kRestingByJerk = 1.0 / 6.0 + 0.5 * 2.0 / 3.0 + 1.0 / 6.0;
 
 // The numbers of a window at its nodes and intervals.
@@ -81,23 +81,24 @@ class StageKernel {
 
   [[nodiscard]] virtual std::size_t mode_places() const = 0;   // K
   [[nodiscard]] virtual std::size_t model_places() const = 0;  // models, in full lanes
-  // y, ẏ, b, ḃ, b̈ and an empty place. It follows from K, and so does base_place(), but each kernel
-  // has both, since its innermost loops ask for them: there the compiler knows what they return.
+  // The size of a state: y, ẏ, b, ḃ, b̈ and an empty place. It follows from K, as base_place()
+  // does. Each kernel still defines both, so that the compiler knows their values in the innermost
+  // loops.
   [[nodiscard]] virtual std::size_t state_size() const = 0;
   [[nodiscard]] virtual std::size_t base_place() const = 0;
 
   virtual void assign(const StageModel& model) = 0;
-  // z of the next node, for inputs that the end prescribes, or else zero. resting: where the base
-  // comes to rest, if it does.
+  // Computes z from node to node. Inputs are zero, except those that the end prescribes. resting:
+  // where the base comes to rest, if it does.
   virtual void roll_out(double resting, StageArrays& at) const = 0;
-  // From the last stage to the first: the feedback of all intervals. P of the first node is in
-  // cost_to_go(). False if the program has no minimum.
+  // Computes the feedback of all intervals, from the last stage to the first. P of the first node
+  // is in cost_to_go(). False if the program has no minimum.
   [[nodiscard]] virtual bool factor(const PerKind<const double*>& weights, StageArrays& at) = 0;
-  // As factor(), and keeps P of every kKeptNodes-th node.
+  // Does the work of factor(), and keeps P of every kKeptNodes-th node.
   [[nodiscard]] virtual bool factor_and_keep(const PerKind<const double*>& weights,
                                              StageArrays& at) = 0;
-  // The feedback of the intervals between these nodes alone, `last` being one whose P is kept, or
-  // the window's last. Sets cost_to_go() if `first` is the window's first node.
+  // Computes the feedback of the intervals between these nodes alone. `last` is a node whose P is
+  // kept, or the window's last node. Sets cost_to_go() if `first` is the window's first node.
   [[nodiscard]] virtual bool factor_between(std::size_t first, std::size_t last,
                                             const PerKind<const double*>& weights,
                                             StageArrays& at) = 0;
@@ -105,25 +106,25 @@ class StageKernel {
   [[nodiscard]] virtual double cost_to_go(std::size_t row, std::size_t column) const = 0;
   // Pulls and cost of the present states.
   virtual void evaluate(StageArrays& at) const = 0;
-  // Takes other aims, in StageArrays' order, as (aim − origin) per unit. Pulls become what the aims
-  // have changed by: at the optimum for the old aims that is all that pulls.
+  // Takes other aims, in StageArrays' order, as (aim − origin) per unit. Pulls become the changes
+  // of the aims, since at the optimum for the old aims nothing else pulls.
   virtual void change_aims(const double* node_aims, const double* middle_aims, double origin,
                            double per_unit, StageArrays& at) const = 0;
-  // Inputs' feedforward, from the last stage to the first. slope: that of the first node's cost,
-  // state_size() numbers. faint_pull: kFaintPull. pulled_by_inputs: whether ρ j counts; the change
-  // of an optimum has no such part.
+  // Computes the inputs' feedforward, from the last stage to the first. slope: that of the first
+  // node's cost, state_size() numbers. faint_pull: kFaintPull. pulled_by_inputs: whether ρ j
+  // counts; the change of an optimum has no such part.
   virtual void carry_slope_back(const PerKind<const double*>& forces, double faint_pull,
                                 bool pulled_by_inputs, StageArrays& at, double* slope) const = 0;
-  // The steps of all states from that of the first node.
+  // Computes the steps of all states from the step of the first node.
   virtual void step_forward(StageArrays& at) const = 0;
-  // As step_forward(), and makes the steps at once instead of writing them down.
+  // Takes the steps of step_forward() at once, without storing them.
   virtual void go_forward(const double* first_step, StageArrays& at) const = 0;
   // p of each model at the nodes: origin + unit times the scaled one, in StageArrays' order.
   virtual void write_nozzles(double origin, double unit, const StageArrays& at,
                              double* nozzles) const = 0;
 };
 
-// The kernel for so many modes and models, by the processor's registers.
+// The kernel for these numbers of modes and models, by the processor's registers.
 [[nodiscard]] std::unique_ptr<StageKernel> make_stage_kernel(std::size_t modes, std::size_t models);
 
 }  // namespace unflex::compensate

@@ -182,7 +182,7 @@ class LaneStages final : public StageKernel {
   [[nodiscard]] static bool is_prescribed(const StageArrays& at, std::size_t k) {
     return at.rests_at_end && k + 3 >= at.nodes;
   }
-  // By b, ḃ and b̈, see stage_form.hpp.
+  // The prescribed feedback of b, ḃ and b̈ (stage_form.hpp).
   [[nodiscard]] static std::array<double, 3> prescribed_feedback(const StageArrays& at,
                                                                  std::size_t k) {
     if (k + 2 == at.nodes) {

@@ -1,6 +1,6 @@
 // The stretches of a window in which limits count. The base without limits breaks them in a few
-// places, mostly at corners, so rows bound it near those alone. Whoever has solved that asks again,
-// since a base that must do less there may do more beside it.
+// places, mostly at corners, so rows bound it only near these places. After each solution the
+// limits are checked again, since a base that must do less there may do more beside it.
 #pragma once
 
 #include <cstddef>
@@ -21,8 +21,8 @@ struct NodeRange {
 // In order, and apart from each other.
 using Stretches = std::vector<NodeRange>;
 
-// Adds all nodes up to `reach` away from one whose value of a kind is out of its bounds and that no
-// stretch has yet. Returns whether there is one.
+// Finds the nodes outside all stretches at which a value of a kind is out of its bounds. Adds all
+// nodes up to `reach` away from them. Returns whether any was found.
 bool add_broken(const PerKind<const double*>& values,
                 const PerKind<std::optional<RowBounds>>& bounds, std::size_t nodes,
                 std::size_t reach, Stretches& stretches);

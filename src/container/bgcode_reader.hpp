@@ -1,5 +1,6 @@
-// Binary G-code to the text that PrusaSlicer would have written: what printers look at and
-// thumbnails at the front, the G-code, then times, filament and settings, all as comments.
+// Binary G-code to the text that PrusaSlicer would have written. The settings that printers read
+// and the thumbnails come first, then the G-code, then times, filament and settings. All but the
+// G-code are comments.
 #pragma once
 
 #include <cstddef>

@@ -15,8 +15,8 @@ constexpr unsigned char kResetAll = 249;
 constexpr unsigned char kEnableNoSpaces = 247;
 constexpr unsigned char kDisableNoSpaces = 246;
 
-// What the sixteen codes stand for. Without spaces, E takes the place of the space. The last code
-// says that the character follows in a byte of its own.
+// The characters of the sixteen codes. Without spaces, E takes the place of the space. The last
+// code says that the character follows in a byte of its own.
 constexpr std::string_view kCharacters = "0123456789. \nGX";
 constexpr unsigned kSpaceCode = 11;
 constexpr unsigned kLineEndCode = 12;

@@ -21,8 +21,8 @@ constexpr std::string_view kProducerKey = "Producer";
 constexpr std::string_view kTimeKey = "Produced on";
 constexpr std::string_view kPreparerKey = "Prepared by";
 
-// What PrusaSlicer 2.8 tells printers, in its order. Settings among these also stay in the block of
-// settings.
+// Metadata that PrusaSlicer 2.8 gives to printers, in its order. Settings among them also stay in
+// the block of settings.
 constexpr std::array<std::string_view, 13> kPrinterSettings = {
     "printer_model",    "filament_type",   "filament_abrasive", "nozzle_diameter",
     "nozzle_high_flow", "bed_temperature", "brim_width",        "fill_density",

@@ -179,7 +179,7 @@ double hypot(double x, double y) {
     return kDown * hypot(kUp * a, kUp * b);
   }
   const double h = std::sqrt(a * a + b * b);
-  // h² − a² − b², so written that little is rounded.
+  // h² − a² − b², in a form that rounds little.
   double excess = 0.0;
   if (h <= 2.0 * b) {
     const double d = h - b;

@@ -7,7 +7,7 @@
 namespace unflex {
 namespace {
 
-// What can be done about a file that cannot be written; empty if that is unknown.
+// The remedy for a file that cannot be written. Empty if none is known.
 std::string_view remedy(int error) {
   switch (error) {
     case ENOSPC:

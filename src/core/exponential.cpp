@@ -44,7 +44,7 @@ constexpr std::array<Pair, kParts> kRoots = {{
     {0x1.ea4afa2a490dap+0, -0x1.e9c23179c2893p-54},
 }};
 
-// e to this is the largest number, and to that less than half of the smallest.
+// e^kMost is the largest number. e^kLeast is less than half of the smallest one.
 constexpr double kMost = 709.782712893384;
 constexpr double kLeast = -745.1332191019412;
 
@@ -139,7 +139,7 @@ Pair log_of(double x) {
   return sum(of_k, of_m);
 }
 
-// What a logarithm is where ln x is no number that log_of() finds.
+// The logarithm, to any base, of an x that log_of() does not take.
 double log_at_edge(double x) {
   if (x == 0.0) {
     return -kInfinity;
@@ -213,7 +213,7 @@ double pow(double x, double y) {
     return kNaN;
   }
   const Pair ln = log_of(x);
-  // As in exp2().
+  // Beyond this the result is 0 or infinite, and the product might not be a number.
   constexpr double kFar = 800.0;
   const double about = y * ln.high;
   return std::abs(about) < kFar ? exp(product({y, 0.0}, ln)) : exp(about);

@@ -39,8 +39,8 @@ bool begin_alike(std::string_view one, std::string_view other) {
          one.substr(0, kLetters) == other.substr(0, kLetters);
 }
 
-// How unlike a key is to what was typed. The same name in another section, a name without its unit
-// and one that begins alike in the same section count as one slip.
+// The distance of a key from the typed text. Three cases count as one slip: the same name in
+// another section, a name without its unit, and a name that begins alike in the same section.
 std::size_t unlikeness(std::string_view typed, std::string_view key) {
   const std::size_t distance = edit_distance(typed, key);
   const bool is_in_section = typed.find('.') != std::string_view::npos &&

@@ -216,7 +216,8 @@ double FlexibleAxis::unseen_s() const {
   if (count_ < 2) {
     return 0.0;
   }
-  // A zero on the wrong side is unseen backwards in time. The least is a limit to that.
+  // The motion at a zero with a positive real part dies away backwards in time, so its rate counts
+  // too. Slower rates count as kLeast_per_s.
   constexpr double kLeast_per_s = 10.0;
   double slowest_per_s = std::numeric_limits<double>::infinity();
   for (const std::complex<double>& zero : zeros()) {
@@ -225,7 +226,7 @@ double FlexibleAxis::unseen_s() const {
   return math::log(1e5) / std::max(slowest_per_s, kLeast_per_s);
 }
 
-// With N_i and D_i the numerator and denominator of mode i, a s + b and α s + β are what solves
+// N_i and D_i are the numerator and denominator of mode i. a s + b and α s + β solve
 //   (a s + b) D₂ + (α s + β) D_i = N_i N₂.
 FlexibleAxis FlexibleAxis::followed_by(double omega_rad_s, double zeta) const {
   const double unit = omega_rad_s;
@@ -282,7 +283,7 @@ NozzleState FlexibleAxis::riding(double position_mm, double velocity_mm_s) const
 NozzleState FlexibleAxis::swinging_as(const FlexibleAxis& other, const NozzleState& nozzle,
                                       double base_mm) const {
   if (other.count_ != count_) {
-    // There is no telling which mode swings, so all do, by their gains.
+    // Which mode swings is not known, so all modes swing in proportion to their gains.
     return riding(nozzle.position(), nozzle.velocity());
   }
   NozzleState state = nozzle;

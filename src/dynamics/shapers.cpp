@@ -16,7 +16,7 @@ double damped_period(double freq_hz, double zeta) {
   return 1.0 / (freq_hz * std::sqrt(1.0 - zeta * zeta));
 }
 
-// What damping leaves of a vibration after a share of the damped period.
+// The share of a vibration that damping leaves after this number of damped periods.
 double decay(double zeta, double periods) {
   return math::exp(-2.0 * std::numbers::pi * zeta * periods / std::sqrt(1.0 - zeta * zeta));
 }
@@ -42,8 +42,8 @@ ShaperPulses repeated_zv(int repeats, double freq_hz, double zeta) {
 //
 //   w_k = w_{k−1} sin((n − k) β)/sin(k β)     β = π (n − 1 − 2t)/((n − 1)(n − 2))
 //
-// Three pulses over 0.75 get the weights 1, √2, 1. They are symmetric; the second half is the
-// mirror of the first, because at t = ½ the ratio of its last is 0/0.
+// Three pulses over 0.75 get the weights 1, √2, 1. Weights are symmetric. The second half is copied
+// from the first, since at t = ½ the ratio for the last weight is 0/0.
 ShaperPulses mzv(const MzvForm& form, double freq_hz, double zeta) {
   const int n = form.pulses;
   const double beta =
@@ -172,9 +172,9 @@ double max_damping_ratio(ShaperKind kind) {
   }
 }
 
-// The lower and upper ends are those of shaper_defs.py, get_mzv_coeffs. More than ten pulses do not
-// fit into chelper/kin_shaper.c. Below half a period weights would be negative, and close to the
-// upper end sin β is 0.
+// The lower and upper ends are from shaper_defs.py, get_mzv_coeffs. More than ten pulses do not fit
+// into chelper/kin_shaper.c. Below half a period weights would be negative, and close to the upper
+// end sin β is 0.
 bool MzvForm::is_defined() const {
   constexpr int kMostPulses = 10;
   constexpr double kLeastBelowTheEnd = 1e-6;

@@ -9,8 +9,8 @@
 
 namespace unflex::emit {
 
-// The cost of the best lines to come if places were real numbers and times fixed. It is that of a
-// linear-quadratic regulator (Anderson & Moore, Optimal Control: Linear Quadratic Methods, § 2.4
+// The cost of the best lines to come if places were real numbers and times fixed. It is the cost of
+// a linear-quadratic regulator (Anderson & Moore, Optimal Control: Linear Quadratic Methods, § 2.4
 // and 4.1).
 template <int kModes>
 class CostToGo {

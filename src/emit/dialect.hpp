@@ -21,7 +21,7 @@ void set_axis_limits(const RunLimits& run, planner::Limits& limits);
 // The limits of a run, with the acceleration of X, Y and filament raised to `accel_mm_s2`.
 [[nodiscard]] planner::Limits raised(planner::Limits in_run, double accel_mm_s2);
 
-// `raised` limits for X, Y and filament; what concerns Z and retraction stays as the file has it.
+// The limits `raised` for X, Y and filament, and the file's limits for Z and retraction.
 [[nodiscard]] planner::Limits limits_in_run(Firmware firmware, const planner::Limits& file,
                                             planner::Limits raised);
 
@@ -34,7 +34,7 @@ struct ZLimits {
 [[nodiscard]] ZLimits z_limits(const planner::FirmwareConfig& config,
                                const planner::Limits& in_run);
 
-// What a run assumes to be in force after a macro that may have changed the limits. Limits that a
+// Limits that a run assumes to be in force after a macro that may have changed them. Limits that a
 // run sets are unknown, so they are always written. Limits that a run leaves to the file are as the
 // file has them, so that no value is written which nobody has said.
 [[nodiscard]] planner::Limits unknown_to_run(Firmware firmware, const planner::Limits& file);
@@ -59,9 +59,9 @@ struct ZLimits {
 // extruder are Klipper's; without a smooth time it stays as it is.
 [[nodiscard]] std::string advance_line(Firmware firmware, const gcode::PressureAdvance& wanted);
 
-// What to type after the print for those axes whose shaper is off, though the printer may have one
-// that is not known: "SET_INPUT_SHAPER SHAPER_FREQ_X=... SHAPER_FREQ_Y=...". Empty if there are
-// none.
+// The command to type after the print, for axes whose shaper is off while the printer may have one
+// that is not known: "SET_INPUT_SHAPER SHAPER_FREQ_X=... SHAPER_FREQ_Y=...". Empty if there are no
+// such axes.
 [[nodiscard]] std::string unknown_shaper_lines(Firmware firmware, const gcode::Shaper& wanted,
                                                const gcode::Shaper& current);
 

@@ -206,7 +206,8 @@ void Emitter::run(const Run& run, const RunPlan& plan, std::string& out) {
   const auto write_events = [&](std::size_t end) {
     for (; written < end; ++written) {
       const gcode::Event& event = (*run.events)[written];
-      // Moves are replaced, those without length too: the base is not where they say.
+      // Moves are replaced, even those without length, since the base is not at the place that they
+      // name.
       const bool stays =
           event.kind != gcode::EventKind::move && !gcode::names_position(event.line.content());
       if (stays && spec_of(options_.fixed.firmware).writing.units_scale_all_words) {
@@ -288,9 +289,10 @@ void Emitter::set_run_modes(const Run& run, bool joins_file, std::string& out) {
   set_unit(1.0, out);
   planner::Limits limits = run_limits(run, input_limits_, options_);
   if (joins_file) {
-    // When a move is added, RepRapFirmware joins it to the move before by the jerk policy in force
-    // at that time, and may still change the move before. With the policy of a run, filament moved
-    // alone before the run would end at the speed of the run's first line, and stop dead.
+    // When a move is added, RepRapFirmware joins it to the previous move by the jerk policy in
+    // force at that time, and may still change the previous move. With the policy of a run,
+    // filament moved alone before the run would end at the speed of the run's first line, and stop
+    // dead.
     limits.jerk_policy = input_limits_.jerk_policy;
   }
   // A run that is interrupted before its first line still begins at rest.
@@ -326,9 +328,9 @@ void Emitter::set_filament_factor(double flow_factor, bool volumetric, std::stri
   }
 }
 
-// Only if the file's own reading of E is known: then it is put back after the run. A part begins
-// with a reading of 0, since Marlin rounds what E reads to whole steps, and which line has a step
-// decides how X and Y turn back (planner.cpp, _populate_block).
+// Acts only if the file's own reading of E is known, since it has to be put back after the run. A
+// part begins with a reading of 0, since Marlin rounds what E reads to whole steps, and which line
+// has a step decides how X and Y turn back (planner.cpp, _populate_block).
 void Emitter::keep_reading_of_e_within(double most_mm, std::string& out) {
   const gcode::ModalState& state = printer_.state();
   if (run_start().zeroes_e && std::abs(state.e_reading()) > most_mm) {
@@ -371,9 +373,9 @@ void Emitter::restore_modes(std::string& out) {
   const gcode::ModalState& wanted = input_.state();
   const gcode::ModalState& state = printer_.state();
   set_filament_factor(wanted.flow_factor, wanted.volumetric, out);
-  // If a G92 E of the input stood at a moment inside one of our lines, put its zero right. Not if a
-  // macro has left an unknown reading of E, since the next E would then be measured from a wrong
-  // zero.
+  // A G92 E of the input may have stood at a moment inside one of our lines. Its zero is put right
+  // here. If a macro has left an unknown reading of E, nothing is done, since the next E would be
+  // measured from a wrong zero.
   if (wanted.known[E] && !same(wanted.base_mm[E], state.base_mm[E])) {
     std::string text = "G92";
     append_word(text, 'E', (state.position_mm[E] - wanted.base_mm[E]) / state.filament_per_e_mm(),

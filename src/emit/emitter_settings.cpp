@@ -1,5 +1,5 @@
-// What the printer is set to in a run and behind it: limits, input shaper, pressure advance, and
-// what a pause must know of them.
+// Settings of the printer in a run and behind it: limits, input shaper, pressure advance, and the
+// facts about them that a pause needs.
 #include <fmt/core.h>
 
 #include <functional>
@@ -41,7 +41,7 @@ void Emitter::restore_shaper(std::string& out) {
   tell_shaper(out);
 }
 
-// What a macro may have set is set again.
+// Sets the run's advance if another one is in force, or may be because of a macro.
 void Emitter::set_run_advance(std::string& out) {
   const gcode::PressureAdvance& sliced = input_.state().pressure_advance;
   const gcode::PressureAdvance& present = printer_.state().pressure_advance;
@@ -76,7 +76,8 @@ void Emitter::restore_advance(bool with_smooth_time, std::string& out) {
   }
 }
 
-// Off, whoever may have switched it on: the printer's configuration, the file, or a macro.
+// Switches the shaper off, whether the printer's configuration, the file or a macro has switched it
+// on.
 void Emitter::switch_shaper_off(std::string& out) {
   const gcode::ModalState& state = printer_.state();
   gcode::Shaper current = state.shaper;

@@ -43,9 +43,9 @@ LinesInTime lines_in_time(const gcode::Position& start_mm, const std::vector<dou
   return result;
 }
 
-// Klipper's smooth time in which the extruder follows what a step Δ of the flow is where lines
-// join: K Δ more filament, by a parabola up and one down. Where it is shorter than lines take,
-// nothing is won.
+// The smooth time with which Klipper's extruder can follow a step Δ of the flow where lines join.
+// The step takes K Δ more filament, which is pushed by a parabola up and one down. A smooth time
+// shorter than lines gains nothing.
 double smooth_time_s(double advance_s, double most_mm_s2) {
   constexpr double kStep_mm_s = 0.8;  // Δ
   constexpr double kLeast_s = 0.008;
@@ -114,7 +114,8 @@ std::vector<PressureLine> wanted_lines(const NozzleProgress& nozzle, const Lines
     line.slope_s = hotend.slope_s(flow_mm_s);
     line.rest_mm = hotend.pressed_mm(flow_mm_s) - line.slope_s * flow_mm_s;
   }
-  // Errors count relative to the filament that a place asks for, and where none is, to the mean.
+  // Errors count relative to the filament that a place asks for. Where a place asks for none, they
+  // count relative to the mean.
   const double mean_mm = drawn_way_mm > 0.0 ? drawn_mm / drawn_way_mm : 1.0;
   for (std::size_t i = 0; i < count; ++i) {
     constexpr double kNoWay_mm = 1e-6;

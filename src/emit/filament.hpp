@@ -35,8 +35,8 @@ struct RunFilament {
 // Whether pressure advance is written into the run.
 [[nodiscard]] bool writes_pressure(const NozzleProgress& nozzle, const EmitOptions& options);
 
-// At which joins of the lines, the i-th being behind line i, the filament would change its speed
-// faster if it might. Shorter lines would let it.
+// Whether a limit keeps the filament from changing its speed faster, for each join of lines. The
+// i-th join is behind line i. Shorter lines would allow a faster change.
 [[nodiscard]] std::vector<bool> joins_at_limit(const NozzleProgress& nozzle,
                                                const LinesInTime& lines,
                                                const EmitOptions& options);

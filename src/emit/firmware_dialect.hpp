@@ -13,7 +13,7 @@
 
 namespace unflex::emit {
 
-// Which axes' shapers are to be written.
+// The axes whose shapers are to be written.
 using ShaperAxes = Axes<bool>;
 
 struct FirmwareDialect {
@@ -27,7 +27,7 @@ struct FirmwareDialect {
                        std::vector<std::string>& lines);
   // The line that sets pressure advance; null: the command of the spec with the advance behind it.
   std::string (*advance_line)(const gcode::PressureAdvance& wanted) = nullptr;
-  // What to type for these axes to switch their shapers on again.
+  // The command to type to switch the shapers of these axes on again.
   std::string (*unknown_shaper_lines)(ShaperAxes axes);
 };
 

@@ -44,7 +44,7 @@ class StepMatrix {
   [[nodiscard]] double dt() const { return dt_; }
   [[nodiscard]] double gain() const { return gain_; }
   [[nodiscard]] Eigen::Matrix2d free() const { return columns_.leftCols<2>(); }
-  // What a base of even velocity does in a step.
+  // The effect of a base of even velocity in a step.
   [[nodiscard]] Eigen::Vector2d base(double position, double velocity) const {
     return columns_.col(2) * position + columns_.col(3) * velocity;
   }
@@ -84,8 +84,8 @@ template <class Use>
                       : use(std::integral_constant<int, 3>{});
 }
 
-// Weight of the polygon's own distance from the base, against the nozzle's error. So motion above
-// about six times the resonance follows the base rather than the nozzle.
+// Weight of the polygon's distance from the base, relative to the nozzle's error. With this weight,
+// motion above about six times the resonance follows the base rather than the nozzle.
 inline constexpr double kBaseWeight = 1e-3;
 
 // ∫ p² = zᵀ P z of a nozzle that rings down around a base at rest in 0, z = (q_1, q̇_1, …), from the

@@ -1,5 +1,5 @@
-// Long straight stretches at constant speed, which one line each covers. A search among shorter
-// lines would find nothing better there, however long it takes.
+// Long straight stretches at constant speed. One line covers each of them, since a search among
+// shorter lines would find nothing better.
 #pragma once
 
 #include <cstddef>

@@ -14,8 +14,9 @@ using dynamics::FlexibleAxis;
 constexpr std::size_t kPerNode = 2;
 // During a line the error is sampled at no more than this many moments.
 constexpr std::size_t kLooks = 16;
-// The frequencies of the two nozzles that follow the lines are off by this share of what they may
-// be off by. More makes the error larger in the middle of the band, less at its ends.
+// The frequencies of the two nozzles that follow the lines are off by this share of
+// LineRules::freq_error. A larger share makes the error larger in the middle of the band and
+// smaller at its ends.
 constexpr double kOfFreqError = 0.7;
 
 std::vector<FlexibleAxis> models_for(const FlexibleAxis& axis, double freq_error) {

@@ -30,7 +30,7 @@
 
 namespace unflex::emit {
 
-// Sizes by the number of modes: of what one axis has in z, of z, and of w.
+// Sizes by the number of modes: of one axis' part of z, of z, and of w.
 template <int kModes>
 inline constexpr int kOfAxis = 2 * kModes + 1;
 template <int kModes>
@@ -127,7 +127,7 @@ struct NozzleAnswers {
 };
 
 [[nodiscard]] inline Eigen::Vector2d vector(const XY& xy) { return {xy.x, xy.y}; }
-// This member of each axis' value.
+// One member of the value of each axis.
 template <typename T>
 [[nodiscard]] Eigen::Vector2d of_axes(const Axes<T>& values, double T::*member) {
   return vector(map_axes([&](const T& value) { return value.*member; }, values));

@@ -26,7 +26,7 @@ constexpr int kMaxSamples = 128;
 // which are not on its curve.
 constexpr double kOwnShare = 0.8;
 
-// Likewise, for a line that is made longer so that it ends at a node.
+// Share of the largest change of speed that a line may use if it is made longer to end at a node.
 constexpr double kShareAtNodes = 0.4;
 
 // e at `steps` + 1 points, equally spaced over the line. steps is no more than kMaxSamples.
@@ -86,7 +86,7 @@ double largest_nozzle_error_mm(const BaseTrajectory& base, double from, double t
   return std::sqrt(largest2);
 }
 
-// How long each line is if as many as possible share the time evenly.
+// The duration of each line if as many lines as possible share the time evenly.
 double even_share_s(double from, double to, const LineRules& rules) {
   constexpr double kRounding = 1e-9;
   return (to - from) / std::max(1.0, std::floor((to - from) / rules.even_line_s() + kRounding));
@@ -189,13 +189,13 @@ bool long_enough(const BaseTrajectory& base, double from, double to, const LineR
 }
 
 bool cuts_well(const BaseTrajectory& base, double from, double to, const LineRules& rules) {
-  // Among this many lines each is hardly longer than the shortest.
+  // If this many lines share the time, each is hardly longer than the shortest.
   constexpr double kMany = 20.0;
   if (to - from > kMany * rules.even_line_s()) {
     return true;
   }
   const double most = kOfSpeedStep * rules.max_speed_step_mm_s;
-  // If not even the shortest lines keep to it, there is nothing to gain.
+  // If even the shortest lines exceed the limit, there is nothing to gain.
   return change_over(base, from, to, even_share_s(from, to, rules), rules.motors) <= most ||
          change_over(base, from, to, rules.even_line_s(), rules.motors) > most;
 }
@@ -212,8 +212,8 @@ void append_line_ends(const BaseTrajectory& base, double from, double to, const 
     }
     // The rest must be long enough for a line too. We take the shortest line in any case, and a
     // longer one as long as it is good.
-    // The shortest line ends at a node, unless speed would change too much then. So many lines are
-    // of one length, and these share what is costly to find (vertices.cpp).
+    // The shortest line ends at a node, unless speed would change too much then. Many lines then
+    // have one length and share results that are costly to compute (vertices.cpp).
     double end = 0.0;
     const double shortest = first_end(start, to, rules);
     const double at_node = next_node(shortest, h);

@@ -1,4 +1,4 @@
-// When the lines of a run end.
+// The times at which the lines of a run end.
 #pragma once
 
 #include <vector>

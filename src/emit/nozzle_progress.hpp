@@ -1,4 +1,4 @@
-// How far along the sliced path the nozzle is, which the filament of a run follows.
+// The nozzle's progress along the sliced path. The filament of a run follows it.
 //
 // Notation:
 //   r, p, b   reference, nozzle and base         s(t)   length of path that r has covered
@@ -23,7 +23,8 @@ class NozzleProgress {
 
   // Q(s_n(t)), mm, from 0 on. As the nozzle never goes back, it is monotone where Q is.
   [[nodiscard]] double filament_mm(double t) const;
-  // Its parts: what moves lay, and what wipes draw back, which is below 0.
+  // The two parts of filament_mm(): filament that moves lay, and filament that wipes draw back,
+  // which is below 0.
   [[nodiscard]] double laid_mm(double t) const;
   [[nodiscard]] double drawn_back_mm(double t) const;
   [[nodiscard]] double all_laid_mm() const { return laid_mm_.back(); }
@@ -42,7 +43,7 @@ class NozzleProgress {
   // s_n of a nozzle at p, while the reference is on `move` and s = reference_mm.
   [[nodiscard]] double nearest_mm(const XY& p_mm, std::size_t move, double reference_mm) const;
   [[nodiscard]] double progress_mm(double t) const;
-  // What has come by t of a quantity that is known where moves begin and end.
+  // The value at time t of a quantity that is known where moves begin and end.
   [[nodiscard]] double along(const std::vector<double>& at_moves, double t) const;
 
   const std::vector<planner::PlannedMove>* moves_;

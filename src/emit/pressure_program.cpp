@@ -212,7 +212,8 @@ class PressureProgram {
     terms_.push_back({f, kSmoothness});
   }
 
-  // η of line k. The wanted flow at its end lies between those of line k and the next.
+  // η of line k. The wanted flow at the line's end lies between the flows of line k and of the next
+  // line.
   void add_end(const std::vector<PressureLine>& lines, std::size_t k) {
     const PressureLine& a = lines[k];
     const PressureLine& b = lines[k + 1];

@@ -1,5 +1,5 @@
-// What the extruder shall push with each line of a run, so that filament comes out of the hotend as
-// the nozzle needs it: an optimal-control problem with a first-order plant.
+// Filament that the extruder pushes with each line of a run, so that the hotend delivers the
+// filament that the nozzle needs. This is an optimal-control problem with a first-order plant.
 //
 // Notation, for line k of n:
 //   T, d     its duration, s, and length, mm
@@ -29,9 +29,9 @@
 // η damps what ε does not see: a flow that is too high at the beginning of a line and too low at
 // its end, and the other way round in the next one.
 //
-// It has a solution where pushing the same per mm in all lines keeps to m and M. x depends on two
-// unknowns, f on three. So the Hessian has two diagonals on either side of its own, and a solution
-// takes a time that grows as n.
+// A solution exists if pushing an equal amount per mm in all lines keeps to m and M. x depends on
+// two unknowns, f on three. So the Hessian has two diagonals on either side of its own, and a
+// solution takes a time that grows as n.
 #pragma once
 
 #include <cstddef>
@@ -58,14 +58,14 @@ inline constexpr double kAtEnds = 0.3;
 // ρ, s²/mm. It decides only what the errors leave open.
 inline constexpr double kSmoothness = 1e-7;
 
-// Which pressure the run begins and ends with.
+// The pressures at the beginning and at the end of a run.
 struct PressureEnds {
   double begin_mm = 0.0;
   double end_mm = 0.0;
 };
 
 // Filament pushed with each line, x. A single line, and lines for which no solution is found, push
-// what they want.
+// the wanted filament.
 [[nodiscard]] std::vector<double> pushed_filament(const std::vector<PressureLine>& lines,
                                                   const PressureEnds& ends);
 

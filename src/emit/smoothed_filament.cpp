@@ -12,14 +12,15 @@
 namespace unflex::emit {
 namespace {
 
-// How many neighbouring knots smoothing reaches over: mostly, and where lines are short.
+// Number of neighbouring knots that smoothing may reach over: usually, and where lines are short.
 constexpr int kMostly = 18;
 constexpr int kShortLines = 40;
 
 // Gauss–Legendre, on [0, 1].
 constexpr std::array<double, 3> kPoints = {0.112701665379258, 0.5, 0.887298334620742};
 constexpr std::array<double, 3> kWeights = {5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0};
-// Where the nozzle stands, time still counts a little.
+// This speed is added in the weights of the error, so that time counts a little even where the
+// nozzle stands.
 constexpr double kLeastSpeed_mm_s = 2.0;
 // A line lays at least this share of what it shall lay.
 constexpr double kLeastShare = 0.1;
@@ -27,14 +28,15 @@ constexpr double kLeastShare = 0.1;
 constexpr double kUnit_mm = 1e-3;
 // Where lines are shorter than the smoothing, the flow might swing from line to line unseen.
 constexpr double kCalm = 3e-3;  // s² mm
-// A limit that is broken by as much as it allows costs this many units² mm.
+// Exceeding a limit by 100 % costs this many units² mm.
 constexpr double kPrice = 1e3;
 constexpr double kGap = 1e-4;
-// A motor follows in about this time, so the mean of p̈ over it counts. Its moments are so far
-// apart.
+// A motor follows in about this time, so the mean of p̈ over this time is limited. It is taken at
+// moments that are kApart_s apart.
 constexpr double kFollows_s = 4e-3;
 constexpr double kApart_s = 1e-3;
-// Limits count only where the best E without any comes so near to them, as a share of them.
+// A limit enters the program only where the best E without limits comes nearer to it than this
+// share of it.
 constexpr double kNear = 0.6;
 // A limit counts as broken if it is exceeded by more than this share of it.
 constexpr double kBroken = -1e-3;
@@ -64,7 +66,7 @@ Limit<W> within(Functional<W> value, double most) {
   return {value, -1.0, 1.0};
 }
 
-// What is linear in the knots.
+// Quantities that are linear in the knots.
 template <int W>
 class Smoother {
  public:

@@ -38,7 +38,7 @@
 
 namespace unflex::emit {
 
-// What a printer does with E, and what its extruder can follow.
+// A printer's smoothing of E, and the limits of its extruder.
 struct SmoothingExtruder {
   double advance_s = 0.0;                                             // K
   double smooth_s = 0.0;                                              // 2 h

@@ -38,7 +38,7 @@ constexpr int kRampRounds = 6;
 constexpr int kRounds = 3;
 // Share of its time by which a line may be shortened or lengthened, to make up for lines before it.
 constexpr double kMostCatchUp = 0.2;
-// Share of the acceleration limit that this may use.
+// Share of the acceleration limit that this catching up may use.
 constexpr double kCatchUpAccel = 0.05;
 // One plan may change a speed by this factor at most, since the reason may have been a neighbour.
 constexpr double kMostCorrection = 2.0;
@@ -81,8 +81,8 @@ int feed_decimals(double feed_mm_min, double duration_s) {
   return decimals;
 }
 
-// What E reads while the lines are written, as Marlin has it: the sum of their words in single
-// precision (Emitter::write_stroke, keep_reading_of_e_within).
+// Marlin's reading of E while the lines are written: the sum of their words in single precision
+// (Emitter::write_stroke, keep_reading_of_e_within).
 class ReadingOfE {
  public:
   // The reading at both ends of the line. e_mm: the filament laid at its end.
@@ -249,7 +249,7 @@ class SpeedSolver {
     }
   }
 
-  // What the lead of a line takes of its length and its time.
+  // The parts of a line's length and time that its lead takes.
   struct Lead {
     double mm = 0.0;
     double s = 0.0;
@@ -267,7 +267,7 @@ class SpeedSolver {
     return {mm, before > 0.0 ? std::min(mm / before, kMostOfLine * duration_s) : 0.0};
   }
 
-  // Whether a line behind one of that speed may have a lead. 0: out of a standstill.
+  // Whether a line may have a lead if the line before it has this speed. 0 stands for standstill.
   [[nodiscard]] bool leads(double before_mm_s) const {
     return before_mm_s > 0.0 ? options_->lines.leads : options_->lines.first_step_s > 0.0;
   }
@@ -436,7 +436,7 @@ class SpeedSolver {
     return passing_.kept_before ? passing_.kept_before->feed_mm_s : magnitude(passing_.in_mm_s);
   }
 
-  // What the ramps of stroke i cost, as distance at its speed.
+  // The cost of the ramps of stroke i, as a distance at its speed.
   [[nodiscard]] double ramps_mm(std::size_t i) const {
     const double v = speed_mm_s_[i];
     const double after =

@@ -1,4 +1,4 @@
-// How fast each line of a run is to be.
+// The speeds of the lines of a run.
 #pragma once
 
 #include <array>

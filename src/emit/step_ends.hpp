@@ -15,7 +15,7 @@ namespace unflex::emit {
 
 using Place = std::array<std::int64_t, 2>;  // in steps
 
-// As a == b, which calls a function for so few bytes.
+// Equivalent to a == b, which would call a function for these few bytes.
 [[nodiscard]] inline bool are_same(const Place& a, const Place& b) {
   return a[0] == b[0] && a[1] == b[1];
 }
@@ -52,7 +52,8 @@ class StepGrid {
   Eigen::Vector2d offset_mm_;
 };
 
-// What a place costs more than the best one: ½ (x, y) S (x, y)ᵀ of its distance from it, in steps.
+// The extra cost of a place over the best one: ½ (x, y) S (x, y)ᵀ, where (x, y) is the distance
+// between the two in steps.
 struct Bowl {
   Bowl() = default;
   Bowl(double xx, double xy, double yy);
@@ -66,7 +67,8 @@ struct Bowl {
   std::array<double, 2> beside{};
 };
 
-// The places allowed: at least min_steps from `from` on one axis, and from least to most.
+// The places allowed: at least min_steps away from `from` on one axis, and between `least` and
+// `most`.
 struct Places {
   Place from{};
   int min_steps = 1;

@@ -21,15 +21,15 @@ namespace {
 
 // States kept for each candidate time.
 constexpr std::size_t kKept = kLanes;
-// This many lines to a candidate, the most promising ones, are tried first. They set the bar for
-// the others.
+// This many of the most promising lines to a candidate are tried first. They lower the cost that
+// the other lines may have to be kept.
 constexpr std::ptrdiff_t kFirst = 8;
 // Candidates of one block, and how many beyond the block are searched with it.
 constexpr std::size_t kBlock = 4096;
 constexpr std::size_t kBeyond = 512;
 // Lines up to this long may lie across a wanted time.
 constexpr double kAcross_mm = 0.25;
-// One more line costs as much as an error as large as the tolerance does in this time.
+// One more line costs as much as an error of the size of the tolerance costs over this time.
 constexpr double kLineWorth_s = 0.01;
 // Lines faster than an even pace cost this many line worths more, per (pace² − 1).
 constexpr double kHaste = 20.0;
@@ -270,8 +270,8 @@ class Search {
                                      : 0.0;
   }
 
-  // What a line over m candidates costs for being a line. Shorter lines cost more, since fewer
-  // lines can then follow within burst_s.
+  // The fixed cost of a line over m candidates. Shorter lines cost more, since fewer lines can then
+  // follow within burst_s.
   [[nodiscard]] double price(std::size_t m) const {
     const double pace = rules_->even_line_s() / (static_cast<double>(m) * costs_->dt_s());
     return line_worth_ * (1.0 + kHaste * std::max(pace * pace - 1.0, 0.0));
@@ -283,7 +283,8 @@ class Search {
     return excess > 0.0 ? kTooQuick * (1.0 + excess) : 0.0;
   }
 
-  // What a line that ends at candidate k costs beyond J, at whatever place it ends.
+  // The cost beyond J of a line that ends at candidate k. It does not depend on the place of its
+  // end.
   [[nodiscard]] double fixed_cost(const Lines<kModes>& lines, std::size_t lane,
                                   std::size_t k) const {
     return lines.price + (costs_->time_s(k) < lines.earliest_s[lane] ? kTooMany : 0.0);
@@ -367,7 +368,8 @@ class Search {
     Places places{.min_steps = rules_->min_steps,
                   .least = grid_.steps(least_mm.cwiseMin(base - slack)),
                   .most = grid_.steps(most_mm.cwiseMax(base + slack))};
-    // The best few set the bar; the order of the others does not matter.
+    // The best few come first, since they lower the cost that a line may have to be kept. The order
+    // of the others does not matter.
     if (std::ssize(options_) > kFirst) {
       std::ranges::nth_element(options_, options_.begin() + kFirst, {}, &Option<kModes>::least);
     }

@@ -15,7 +15,7 @@ namespace unflex::emit {
 // A line's end, with all lines before it.
 template <int kModes>
 struct State {
-  double total = 0.0;  // what the state has cost and will cost
+  double total = 0.0;  // cost of the lines so far and to come
   double spent = 0.0;
   ZVector<kModes> z = ZVector<kModes>::Zero();
   Place at{};
@@ -25,7 +25,7 @@ struct State {
   std::int32_t parent = -1;
 };
 
-// What one search covers: from a state to a place.
+// The stretch of one search: from a state to a place.
 template <int kModes>
 struct Stretch {
   State<kModes> begin;

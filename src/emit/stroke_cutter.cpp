@@ -30,7 +30,7 @@ bool turns_quickly(const XY& before, const XY& after, const LineRules& rules) {
   return rules.motors.largest_of_xy(after - before) > rules.max_speed_step_mm_s;
 }
 
-// How much of its change of Z a line can take. The line must not become steep, nor slow: Z has
+// The part of its change of Z that a line can take. The line must not become steep, nor slow: Z has
 // limits of its own, which a run leaves as they are. The rest waits for other lines, as long as it
 // is too small to be seen. `before` and `after` are the velocities of the neighbouring lines.
 double change_of_z_mm(const Stroke& from, const Stroke& to, const XY& before, const XY& after,

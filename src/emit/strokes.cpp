@@ -63,7 +63,7 @@ std::vector<double> required_times(const Run& run, const std::vector<double>& wa
   return times;
 }
 
-// Where the file's own moves take the machine. The firmware may round that place.
+// The place to which the file's own moves take the machine. The firmware may round it.
 gcode::Position end_of_moves(const Run& run) {
   for (auto event = run.events->rbegin(); event != run.events->rend(); ++event) {
     if (!event->segments.empty()) {
@@ -85,7 +85,7 @@ bool skips_last_move(const Run& run, const Grid& grid) {
                   xy_of(end) - xy_of(machine), grid);
 }
 
-// Where the run's lines take the machine.
+// The place to which the run's lines take the machine.
 gcode::Position end_of_lines(const Run& run, const Timetable& table, const Grid& grid) {
   gcode::Position end =
       skips_last_move(run, grid) ? run.moves->back().segment.end_mm : end_of_moves(run);
@@ -96,8 +96,8 @@ gcode::Position end_of_lines(const Run& run, const Timetable& table, const Grid&
   return end;
 }
 
-// Where the file is when the run begins. Marlin may be behind by the filament of a move that was
-// too short for it.
+// The file's position when the run begins. Marlin may be behind this position by the filament of a
+// move that was too short for it.
 gcode::Position start_of(const Run& run) {
   for (const gcode::Event& event : *run.events) {
     if (!event.segments.empty()) {
@@ -126,9 +126,9 @@ bool is_at_corner(const Run& run, const Timetable& table, std::size_t move, doub
          (t > table.start_s(move + 1) - kReach_s && turns_behind(move));
 }
 
-// Across a drawn path errors count most; along it they only shift time, though at a sharp corner
-// they lead off the path, and so does each error behind its end. Where nothing is drawn, errors
-// matter only by what they leave behind for later.
+// Errors across a drawn path count most. Errors along the path only shift time, except at a sharp
+// corner and at the path's end, where they lead off the path. Where nothing is drawn, errors matter
+// only by their effect on later motion.
 ErrorWeight error_weight(const Run& run, const Timetable& table, double t) {
   constexpr double kAlong = 0.001;
   constexpr double kAlongAtCorner = 0.03;

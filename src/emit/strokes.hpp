@@ -32,7 +32,7 @@ inline constexpr int kFilamentDecimals = 5;
 // more, it is set to 0.
 inline constexpr double kMostReadingOfE_mm = 64.0;
 
-// What a run is written in: places, and speeds as F before M220.
+// The numbers in which a run is written: places, and speeds as F before M220.
 struct Grid : Axes<AxisGrid> {
   AxisGrid z;
   double speed_factor = 1.0;  // M220 when the run begins
@@ -43,7 +43,7 @@ struct Grid : Axes<AxisGrid> {
 [[nodiscard]] XY start_of_lines(const Run& run, const Grid& grid);
 
 // The strokes of a run. Positions lie on the grid, but a run's last one is exactly where the last
-// move ends. Where the firmware skips that move, so does the last stroke (is_skipped). A stroke
+// move ends. If the firmware skips that move, it skips the last stroke too (is_skipped). A stroke
 // that would have no length after rounding is merged into its successor; at the ends of the run it
 // is dropped. Empty when nothing is left.
 [[nodiscard]] std::vector<Stroke> strokes(const Run& run, const Grid& grid,
@@ -55,7 +55,7 @@ struct Grid : Axes<AxisGrid> {
 // way.
 void give_length(const Stroke& next, const Grid& grid, const LineRules& rules, Stroke& stroke);
 
-// Gives them new speeds, for another Run::late_s.
+// Gives the strokes new speeds, for another Run::late_s.
 void time_strokes(const Run& run, const Grid& grid, const EmitOptions& options,
                   std::vector<Stroke>& strokes);
 

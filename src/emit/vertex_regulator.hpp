@@ -15,11 +15,12 @@
 // The change of speed v_k − v_{k−1} = u + c_k − c_{k−1} has bounds. So has the change behind the
 // last line, which depends on the last g. Where the law above breaks them, bounds are kept by ADMM:
 // w is the nearest value within the bounds, λ the scaled dual, and ρ/2 (u − w + λ)² is added to the
-// cost. The last g is treated like a u. The gains stay what they are (O'Donoghue, Stathopoulos &
+// cost. The last g is treated like a u. ADMM does not change the gains (O'Donoghue, Stathopoulos &
 // Boyd, A splitting method for optimal control, IEEE Trans. Control Syst. Technol. 21, 2013). Where
 // a bound is still broken by more than a little, the vertices stay on the curve.
 //
-// Lines of as many steps of one length share M, H and how h follows from the chord.
+// Lines with the same number of steps of the same length share M, H and the map from the chord to
+// h.
 #pragma once
 
 #include <Eigen/Core>
@@ -54,11 +55,12 @@ using Square = Eigen::Matrix<double, kSize, kSize>;
 // Weight of the last vertex's distance from the base, against e² over a second: that vertex is to
 // be the base's own.
 inline constexpr double kAtEnd = 1e3;
-// ADMM: the most rounds, the change at which it ends, and ρ as a share of what u costs without it.
+// ADMM: the largest number of rounds, the change at which it ends, and ρ as a share of the cost of
+// u without ρ.
 inline constexpr int kMostRounds = 200;
 inline constexpr double kSettled_mm_s = 0.02;
 inline constexpr double kPull = 0.3;
-// How many lines on either side go on with one that still changes.
+// Lines are still worked on within this many lines of a line whose u still changes.
 inline constexpr std::size_t kAround = 24;
 // A change of speed may exceed its bounds by this share of their width: ADMM ends a little outside,
 // and the last line, which ends where the base does, takes what is left.
@@ -140,7 +142,7 @@ class Steps {
       states.template middleRows<2>(2 * i) = of_mode_[static_cast<std::size_t>(i)].free() * before;
     }
   }
-  // What the base does in a step.
+  // The effect of the base in a step.
   [[nodiscard]] Vector<kOfY<kModes>> base(double position, double velocity) const {
     Vector<kOfY<kModes>> result;
     for (Eigen::Index i = 0; i < kModes; ++i) {
@@ -292,8 +294,8 @@ struct Drawn {
 };
 
 // Sets the laws of all lines so that each u lies within its bounds, nearly. The feedback of all
-// laws is set at once. Then only lines near those whose u still changes are worked on: what u does
-// is forgotten within as many lines as the nozzle rings.
+// laws is set at once. Then only lines near those whose u still changes are worked on, since the
+// effect of u fades within the lines over which the nozzle rings.
 template <int kModes>
 class Regulator {
  public:
@@ -397,7 +399,7 @@ class Regulator {
 
   Ending<kModes>& ending_;
   std::vector<Stage<kModes>>& stages_;
-  // Those of u on each line, and of the last g.
+  // w and λ of u on each line, and of the last g.
   std::vector<Drawn> drawn_;
   std::vector<State> to_go_;   // slope of the cost to go, before each line and behind the last one
   std::vector<State> z_;       // there

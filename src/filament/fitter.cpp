@@ -18,7 +18,7 @@ namespace {
 using gcode::E;
 
 constexpr int kDecimals = 5;
-// Less is not seen in what is written.
+// A smaller difference does not show in the written text.
 constexpr double kNothing = 1e-9;
 
 std::string number_text(double value) {
@@ -84,7 +84,7 @@ double filament_of(const gcode::Event& event) {
   return sum_mm;
 }
 
-// What E reads, in the unit of its words.
+// The reading of E, in the unit of its words.
 double reading_of(const gcode::ModalState& state) {
   return (state.position_mm[E] - state.base_mm[E]) / state.filament_per_e_mm();
 }

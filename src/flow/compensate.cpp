@@ -106,13 +106,13 @@ bool warn_of_no_run(const Job& job, report::Report& report) {
   return true;
 }
 
-// Where much stays as sliced, it is played without the printer's own shaper, and the whole may be
-// worse than the sliced file.
+// Runs that stay as sliced are played without the printer's own shaper. With many of them the whole
+// print may be worse than the sliced file.
 void warn_of_no_gain(const Job& job, report::Report& report) {
   constexpr double kWorse = 1.05;
   constexpr double kWorse_mm = 2e-4;
   if (report::keeps_tolerance(report)) {
-    return;  // it was to be faster, and is as exact as it was to be
+    return;  // faster, and as exact as asked
   }
   const double now_mm = report.measured.uncompensated.extruding.contour_rms_mm;
   const double compensated_mm = report.measured.compensated.extruding.contour_rms_mm;
@@ -126,7 +126,7 @@ void warn_of_no_gain(const Job& job, report::Report& report) {
                   report::micrometres_text(compensated_mm), report::micrometres_text(now_mm))}));
 }
 
-// Both engines find the optimum of the same program, so that they differ is an error of either.
+// Both engines find the optimum of the same program. If they differ, one of them is wrong.
 void warn_of_gap(const Job& job, report::Report& report) {
   constexpr double kMostGap = 1e-5;
   constexpr double kMost_mm = 5e-4;
@@ -143,7 +143,7 @@ void warn_of_gap(const Job& job, report::Report& report) {
           100.0 * check.largest_gap, report::micrometres_text(check.largest_difference_mm))}));
 }
 
-// A stream has gone by before it is known what comes, so its hotend is not followed.
+// A stream has gone by before its later lines are known, so its hotend is not followed.
 Status follow_hotend(const Job& job, Progress& progress, report::Report& report) {
   if (!job.input_stream && !job.output_stream) {
     return temperature::follow_temperature(job, temperature::OutputMay::change, progress, report);
@@ -194,7 +194,7 @@ Result<report::Report> compensate_with(const Job& job, const Engines& engines, P
     }
     if (report.measured.uncompensated.time_s > 0.0 && !job.output_stream) {
       if (!job.settings.is_timing_free()) {
-        outcome.time_notes.clear();  // all of the print takes about as much longer
+        outcome.time_notes.clear();  // all parts of the print take longer by about the same factor
       }
       if (Status status =
               retime(*job.output, job.output_name, outcome.time_notes,

@@ -55,8 +55,8 @@ machine::Settings as_sliced(machine::Settings settings) {
   return settings;
 }
 
-// A stream cannot be written again with a run kept, and no pass follows the last one. There a run
-// may be worse by more before it counts as a violation.
+// A stream cannot be written again with a run kept, and no pass follows the last one. In both cases
+// a run may be worse by more before it counts as a violation.
 verify::Rules rules_of_pass(const Job& job, bool last) {
   verify::Rules rules = run::verify_rules(job.settings);
   if (job.output_stream || last) {
@@ -68,14 +68,14 @@ verify::Rules rules_of_pass(const Job& job, bool last) {
   return rules;
 }
 
-// What share of the input is done.
+// The share of the input that is done.
 class PassProgress {
  public:
   PassProgress(const Job& job, Progress& progress)
       : progress_(&progress), input_bytes_(input_bytes(job)) {}
 
   void write(std::size_t bytes) { written_bytes_ += bytes; }
-  // Runs that are being worked on count for what is done of them.
+  // Runs that are being worked on count with the share that is done.
   void tell(const RunQueue& queue) {
     most_bytes_ = std::max(most_bytes_, static_cast<double>(written_bytes_) + queue.done_bytes());
     progress_->update("compensating", share_of_input(most_bytes_, input_bytes_));
@@ -86,7 +86,7 @@ class PassProgress {
   Progress* progress_;
   double input_bytes_;             // 0: not known
   std::size_t written_bytes_ = 0;  // of the input
-  double most_bytes_ = 0.0;        // with what is done of the runs in the queue
+  double most_bytes_ = 0.0;  // written_bytes_, and the finished share of the runs in the queue
 };
 
 // Tells a waiting thread that there is something to do.
@@ -96,7 +96,7 @@ class Bell {
     const Lock lock(mutex_);
     news_.notify_one();
   }
-  // Waits until there is something, for at most so long.
+  // Waits for news, at most for `patience`.
   template <class HasNews>
   void wait(std::chrono::milliseconds patience, HasNews has_news) {
     Lock lock(mutex_);
@@ -187,8 +187,8 @@ class Compensator {
     return check_engine().and_then([&] { return finish_verification(); });
   }
 
-  // Whether more should be read. There is room where a layer may be too short, as what follows must
-  // be known then.
+  // Whether to read more. There is always room while a layer may be too short, since the following
+  // lines must be known then.
   [[nodiscard]] bool has_room() {
     return (queue_.has_room() || layers_.needs_more()) && !verifier_.is_behind();
   }
@@ -224,7 +224,7 @@ class Compensator {
     });
   }
 
-  // Gives the solvers what they can take, in the order of the file.
+  // Gives the solvers as many windows as they can take, in the order of the file.
   void feed() {
     layers_.settle();
     for (std::size_t piece = 0; piece < queue_.size(); ++piece) {
@@ -261,7 +261,7 @@ class Compensator {
     return true;
   }
 
-  // The timing of a run is known, so its windows are.
+  // Lays out the windows of a run whose timing is known.
   void lay_out(const std::shared_ptr<run::RunJob>& job) {
     run::stretch(*job);
     run::lay_out(*job);
@@ -301,7 +301,7 @@ class Compensator {
       }
       return;
     }
-    // The verifier does not tell when it has caught up, so look again soon.
+    // The verifier does not report when it has caught up, so this looks again soon.
     bell_.wait(verifier_.is_behind() ? kShortPatience : kPatience, [this] {
       return can_write() || can_feed() || (has_room() && !queue_.is_ended() && pieces_.has_news());
     });

@@ -17,7 +17,7 @@
 
 namespace unflex::flow {
 
-// What a pass works with; all must outlive it.
+// The input and the output of a pass. All objects must outlive it.
 struct PassStreams {
   std::istream& input;
   std::ostream& output;

@@ -24,8 +24,8 @@ class GapCheck {
   // Takes the job's probes once they are solved.
   void take(run::RunJob& job);
 
-  // The chosen problems with the first engine's solutions. compare() adds to `check` how far the
-  // second engine's solution of one is away.
+  // The chosen problems with the first engine's solutions. compare() adds to `check` the gap of the
+  // second engine's solution of one problem.
   [[nodiscard]] const std::vector<run::Probe>& probes() const { return probes_; }
   static void compare(const run::Probe& probe, const compensate::AxisSolution& second,
                       report::SolverCheck& check);

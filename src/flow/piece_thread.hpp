@@ -38,8 +38,8 @@ class PieceThread {
   [[nodiscard]] bool has_news();
   // Whether the last piece has been taken: the input has ended, or could not be read on.
   [[nodiscard]] bool at_end();
-  // To be called at the end. Throws what the thread could not handle, such as std::bad_alloc:
-  // without memory it could not make an Error of it.
+  // To be called at the end. Throws an exception that the thread could not turn into an Error. For
+  // std::bad_alloc it had no memory to do so.
   [[nodiscard]] const std::optional<Error>& error() const;
   [[nodiscard]] const std::vector<Diagnostic>& warnings() const { return reader_.warnings(); }
 

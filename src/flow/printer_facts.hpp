@@ -1,4 +1,4 @@
-// What a report says of the printer.
+// Facts about the printer for the report.
 #pragma once
 
 #include <optional>
@@ -12,8 +12,8 @@ namespace unflex::flow {
 
 [[nodiscard]] report::PrinterFacts printer_facts(const machine::Settings& settings);
 
-// The shaper that the printer's configuration has, whatever the print sets; nullopt if it has none
-// or none is known.
+// The shaper in the printer's configuration, whatever the print sets. nullopt if there is none, or
+// none is known.
 [[nodiscard]] std::optional<record::PrinterShaper> printer_shaper(const verify::Rules& rules);
 
 }  // namespace unflex::flow

@@ -19,14 +19,15 @@ class ProcessSolver {
   [[nodiscard]] std::size_t under_way() const { return processes_->under_way(); }
   // Submits these windows.
   void submit(const std::shared_ptr<run::RunJob>& job, std::size_t first, std::size_t count);
-  // Waits for a window, for at most so long. Returns its run if that is solved now.
+  // Waits for a window, at most for patience_ms. Returns the window's run if the run is solved now.
   [[nodiscard]] std::shared_ptr<run::RunJob> take(int patience_ms);
-  // All windows of the job were submitted and solved; it is the first of those that were.
+  // Forgets a job whose windows were all submitted and solved. It must be the oldest of the
+  // submitted ones.
   void forget(const run::RunJob& job);
 
   // Submits the probes. No windows are under way.
   void submit(const GapCheck& probes);
-  // Waits for a probe, for at most so long, and compares it.
+  // Waits for a probe, at most for patience_ms, and compares it.
   void take(const GapCheck& probes, int patience_ms, report::SolverCheck& check);
 
  private:

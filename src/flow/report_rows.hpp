@@ -1,4 +1,4 @@
-// From the stages' results to the report's plain rows.
+// Turns the stages' results into the report's plain rows.
 #pragma once
 
 #include <chrono>
@@ -14,16 +14,16 @@
 
 namespace unflex::flow {
 
-// A report with what the job itself says.
+// A report with the facts of the job.
 [[nodiscard]] report::Report new_report(std::string command, const Job& job);
 
-// What the work since `begin` has cost this process and its children.
+// Adds the cost of the work since `begin` to this process and its children.
 void add_performance(std::chrono::steady_clock::time_point begin, report::Report& report);
 
 // Gathers where the nozzle strays most, and what input shapers would do.
 [[nodiscard]] std::unique_ptr<record::Recorder> recorder_for(const Job& job,
                                                              const verify::Rules& rules);
-// What else a verification is to measure.
+// The further measurements of a verification.
 [[nodiscard]] verify::Observation observation_of(record::Recorder& recorder,
                                                  const verify::Rules& rules);
 

@@ -19,13 +19,15 @@ namespace unflex::flow {
 // A part of the print that is shorter than this says nothing about how much longer it takes.
 inline constexpr double kShortest_s = 10.0;
 
-// How many times as long it takes, for a note and the end of the print. The print must last.
+// The factors by which durations grow, for a note in a print that ends at `end`. The print must
+// last.
 [[nodiscard]] gcode::TimeFactors factors_at(const verify::TimeNote& note,
                                             const verify::TimeNote& end);
 
-// Corrects such durations in a file, in place, each by what has been printed before it and what is
-// still to come. A line that is not among the notes, which rise, tells of the whole print. Fails if
-// the file cannot be read or written; `name` is what the error calls it.
+// Corrects the durations in a file, in place: those in M73 and in the slicer's comments. Each is
+// corrected by the part of the print before it and the part still to come. A line that is not among
+// the notes, which rise, tells of the whole print. Fails if the file cannot be read or written;
+// `name` is the file's name in the error.
 [[nodiscard]] Status retime(TextStore& text, const std::string& name,
                             const std::vector<verify::TimeNote>& notes,
                             const verify::TimeNote& end);

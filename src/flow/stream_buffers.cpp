@@ -10,7 +10,7 @@ namespace unflex::flow {
 namespace {
 
 constexpr std::size_t kBlockBytes = 256 * 1024;
-// How often a wait is interrupted to see whether it is still wanted.
+// The longest single wait. After it the waiting thread sees whether the wait is still wanted.
 constexpr std::chrono::milliseconds kPatience{50};
 
 // Waits until the stream is ready; false once it is unwanted.

@@ -78,7 +78,8 @@ std::unique_ptr<record::Recorder> recorder_for(const Job& job, const verify::Rul
     }
     options.printer_shaper = std::move(own);
   } else if (own) {
-    // It acts on the sliced file as that is played. The summary tells of no other.
+    // The printer's own shaper acts on the sliced file as it is played. The summary tells of no
+    // other shaper.
     options.shapers = {};
   } else {
     options.shapers = kOfSummary;

@@ -47,7 +47,7 @@ class TextQueue final : public std::streambuf {
 
 class VerifyThread {
  public:
-  // What the observation refers to must outlive this object.
+  // The objects that the observation refers to must outlive this object.
   VerifyThread(const verify::Rules& rules, const verify::Observation& observation,
                std::string input_name, std::string output_name, CpuSlots& slots);
   // Stops the verification if it is still under way.

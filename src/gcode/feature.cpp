@@ -11,7 +11,7 @@ namespace {
 using Kind = FeatureKind;
 using Name = std::pair<std::string_view, Kind>;
 
-// As folded() gives them.
+// Names of features as folded() gives them.
 //
 // PrusaSlicer, SuperSlicer, Slic3r: src/libslic3r/ExtrusionEntity.cpp, role_to_string(). Orca and
 // Bambu Studio: the same file. Cura: CuraEngine, src/gcodeExport.cpp, writeTypeComment().

@@ -164,8 +164,8 @@ std::vector<Ahead> candidates(const Plant& plant, const Course& course,
   return found;
 }
 
-// Chooses those of some changes with which filament is laid out of the band for no longer than
-// without.
+// Chooses from some changes those that do not lengthen the time in which filament is laid outside
+// the band.
 class Harmless {
  public:
   using OutOfBand = std::function<double(const std::vector<Ahead>&)>;
@@ -179,8 +179,8 @@ class Harmless {
   }
 
  private:
-  // Adds all of them if that does no harm, or else what does none of either half. So few harmful
-  // ones among many cost few simulations.
+  // Adds all changes if together they do no harm. Otherwise it does the same for either half. So
+  // few harmful changes among many cost few simulations.
   void add(std::span<const Ahead> changes) {
     constexpr double kRounding_s = 1e-6;
     std::vector<Ahead> with = chosen_;

@@ -1,4 +1,4 @@
-// A controller of temperature as firmwares have it. Control of closed_loop.hpp says what that is,
+// A controller of temperature as firmwares have it. Control in closed_loop.hpp describes it;
 // rules.hpp has the notation of its gains.
 #pragma once
 

@@ -9,7 +9,7 @@
 namespace unflex::hotend {
 namespace {
 
-// K of a τ, and τ of a K, since K τ = ΔT / (ΔT/100)^E.
+// Gives K for a τ, and τ for a K, since K τ = ΔT / (ΔT/100)^E.
 double across_power_law(double value, double rise_c, double exponent) {
   return rise_c / (value * math::pow(rise_c / 100.0, exponent));
 }

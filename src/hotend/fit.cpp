@@ -57,7 +57,8 @@ class Search {
         beginning_(beginning),
         with_ambient_(with_ambient) {}
 
-  // Columns of the linear unknowns, those of jumps last. A row for each jump follows the data's.
+  // Columns of the linear unknowns; those of the jumps come last. Below the data's rows there is
+  // one row for each jump.
   [[nodiscard]] Eigen::MatrixXd columns(const Eigen::Vector3d& p) const {
     const Eigen::MatrixXd plain = model_.columns(lags_of(p), beginning_, with_ambient_);
     if (jumps_.empty()) {
@@ -71,7 +72,7 @@ class Search {
     return all;
   }
 
-  // How many linear unknowns are not of jumps.
+  // The number of linear unknowns besides the jumps.
   [[nodiscard]] Eigen::Index plain_unknowns() const {
     return 1 + (beginning_.at_rest ? 0 : 2) + (with_ambient_ ? 1 : 0);
   }
@@ -117,7 +118,7 @@ class Search {
     return std::move(*std::ranges::min_element(found, {}, by_sum));
   }
 
-  // Derivatives by p with the linear unknowns held, and behind them by these.
+  // Derivatives by p with the linear unknowns held, then derivatives by the linear unknowns.
   [[nodiscard]] Eigen::MatrixXd jacobian(const Solution& solution) const {
     const Eigen::MatrixXd matrix = columns(solution.p);
     Eigen::MatrixXd all(matrix.rows(), 3 + matrix.cols());
@@ -234,7 +235,7 @@ Status check(const Log& log) {
   return {};
 }
 
-// The mean square of what is left, without the rows of jumps.
+// The mean square of the residual, without the rows of the jumps.
 double variance_left(const Solution& solution, Eigen::Index count) {
   return solution.residual.head(count).squaredNorm() / static_cast<double>(count);
 }
@@ -285,9 +286,9 @@ Result<PlantFit> fit_plant(const Log& log, const FitOptions& options) {
   for (Eigen::Index k = 0; k < model.size(); ++k) {
     temperature_c[k] = log.samples[static_cast<std::size_t>(k)].temperature_c;
   }
-  // A beginning with two unknowns more must be worth them, by Schwarz' criterion and some doubt.
+  // A beginning with two more unknowns must be worth them, by Schwarz' criterion and some doubt.
   constexpr double kWorth = 12.0;
-  std::optional<double> worth_of_data;  // how many independent ones they are worth
+  std::optional<double> worth_of_data;  // the number of independent data that tell as much
   std::optional<PlantFit> best;
   double least = 0.0;
   for (const Beginning& beginning : beginnings(log, options)) {

@@ -40,7 +40,7 @@ Eigen::MatrixXd FitModel::columns(const Lags& lags, const Beginning& beginning,
     block = felt + step.block * off;
     now_s = time_s;
   };
-  // The first change that the block feels is that from before the log to its first power.
+  // The block first feels the change from the power before the log to the log's first power.
   std::size_t next = 0;
   const auto next_s = [&] {
     return lags.dead_time_s + (next == 0 ? 0.0 : changes_[next - 1].time_s);

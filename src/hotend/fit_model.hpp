@@ -1,4 +1,4 @@
-// The plant's answer to a log's power, as columns of what is linear in it.
+// The plant's answer to a log's power, as columns for the linear unknowns.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,7 +8,7 @@
 
 namespace unflex::hotend {
 
-// What is not linear.
+// The unknowns that are not linear.
 struct Lags {
   double time_constant_s = 0.0;
   double sensor_lag_s = 0.0;
@@ -27,8 +27,8 @@ class FitModel {
 
   [[nodiscard]] Eigen::Index size() const { return static_cast<Eigen::Index>(time_s_.size()); }
 
-  // Columns of the temperature above ambient at the log's times: for K = 1, and if the log does not
-  // begin at rest, for T₁ = 1 and T = 1 at its beginning. Behind them one of ones if the ambient
+  // Columns of the temperature above ambient at the log's times: for K = 1 and, if the log does not
+  // begin at rest, for T₁ = 1 and T = 1 at its beginning. A column of ones follows if the ambient
   // temperature is an unknown.
   [[nodiscard]] Eigen::MatrixXd columns(const Lags& lags, const Beginning& beginning,
                                         bool with_ambient) const;

@@ -1,4 +1,5 @@
-// What hosts write while they print: Klipper's klippy.log, and serial logs such as OctoPrint's.
+// Logs that hosts write while they print: Klipper's klippy.log, and serial logs such as
+// OctoPrint's.
 #include <fmt/core.h>
 
 #include <array>
@@ -16,7 +17,7 @@ bool is_word(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
 }
 
-// What follows `key` where it begins a word.
+// The text behind `key` where `key` begins a word.
 std::optional<std::string_view> behind(std::string_view text, std::string_view key) {
   for (std::size_t at = text.find(key); at != std::string_view::npos; at = text.find(key, at + 1)) {
     if (at == 0 || !is_word(text[at - 1])) {

@@ -15,8 +15,8 @@ namespace unflex::identify {
 
 inline constexpr double kFitFrom_hz = 15.0;
 
-// Which density of a spectrum stands for the axis: the column with three fifths of the energy in
-// the band, as a sensor may be mounted turned, or else the sum of all three.
+// The density of a spectrum that stands for the axis. A sensor may be mounted turned. So it is the
+// column with three fifths of the energy in the band, or else the sum of all three.
 struct AxisDensity {
   std::vector<double> density;  // as Spectrum's
   // The column with the most energy, where the density is the sum.
@@ -33,8 +33,8 @@ struct Band {
   Eigen::Index first = 0;
   Eigen::ArrayXd freq_hz;
   Eigen::ArrayXd density;
-  // Joins measured and fitted density before their logarithms are compared. What lies below moves
-  // the nozzle little, and must not cost a mode.
+  // Added to measured and fitted density before their logarithms are compared. A density below it
+  // moves the nozzle little, and must not cost a mode.
   Eigen::ArrayXd floor = {};
 
   [[nodiscard]] Eigen::ArrayXd logarithms() const {

@@ -35,8 +35,9 @@ Eigen::VectorXd parameters_of(const std::vector<ModeOfAxis>& modes) {
   return result;
 }
 
-// The modes in the order of those of `like`: each the one of nearest frequency. Empty if their
-// numbers differ, if two would share one, or if one is too far off to be the same.
+// The modes in the order of the modes of `like`, each one the nearest in frequency. Empty if the
+// numbers of modes differ, if two modes would share one, or if a mode is too far off to be the
+// same.
 std::vector<std::size_t> matched(const std::vector<ModeOfAxis>& modes,
                                  const std::vector<ModeOfAxis>& like) {
   constexpr double kFarthest = 0.15;  // of the logarithm of the frequency
@@ -160,8 +161,8 @@ AxisModel with_others_as_plants(const std::vector<AxisModel>& models) {
   return result;
 }
 
-// An axis with modes out of `known` in place of its own, keeping the gains, as far as that
-// changes how it swings by no more than `most`.
+// The modes of an axis, some of them replaced by modes out of `known`. Gains stay. The replacements
+// change how the axis swings by no more than `most`.
 std::vector<ModeOfAxis> shared_with(const std::vector<ModeOfAxis>& known,
                                     const std::vector<ModeOfAxis>& own, double most) {
   std::vector<ModeOfAxis> modes = own;
@@ -172,7 +173,7 @@ std::vector<ModeOfAxis> shared_with(const std::vector<ModeOfAxis>& known,
     other[m].damping_ratio = by.damping_ratio;
     return other;
   };
-  // One after the other, that with the least effect first.
+  // Each round replaces the mode with the least effect.
   for (std::size_t round = 0; round < modes.size(); ++round) {
     double least = most;
     std::size_t which = modes.size();
@@ -207,7 +208,7 @@ std::string_view to_string(Method method) {
 
 std::vector<Plant> other_plants(const AxisModel& model) {
   constexpr double kNear = 0.03;
-  // A change by less than this share of the swing does not count: the plants' errors change by a
+  // A change by less than this share of the swing does not count. The plants' errors change by a
   // few per cent, and each mode less makes the base cheaper to find.
   constexpr double kNothing = 0.1;
   constexpr std::size_t kMost = 6;
@@ -255,7 +256,7 @@ AxisModel combine(const std::vector<AxisModel>& models) {
   if (all.empty()) {
     return with_others_as_plants(models);
   }
-  // Means of gains say nothing where the records share them out in other ways.
+  // Means of gains say nothing where the records divide them among the modes in other ways.
   AxisModel mean = averaged(all);
   const Estimate& gain = mean.modes.front().gain;
   return gain.low < 0.0 && gain.high > 0.0 ? with_others_as_plants(models) : mean;

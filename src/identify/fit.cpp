@@ -132,7 +132,7 @@ Result<RecordFit> fit(const DataSet& set, Axis axis, const Sweep& sweep) {
   if (!record) {
     return fail(record.error().kind, {set.name, 0}, record.error().message);
   }
-  // Such numbers do not describe a resonance.
+  // A mode without finite intervals does not describe a resonance.
   if (record->is_trusted() &&
       !std::ranges::all_of(record->model.modes,
                            [](const ModeEstimate& mode) { return is_known(mode); })) {

@@ -26,7 +26,7 @@ struct LeastSquares {
 using ModelWithJacobian =
     std::function<void(const Eigen::VectorXd&, Eigen::ArrayXd& values, Eigen::MatrixXd* jacobian)>;
 
-// Bounds of the parameters, and what is known of them before: centre and precision of each.
+// Bounds of the parameters, and the knowledge before the fit: centre and precision of each.
 struct Prior {
   Eigen::VectorXd low;
   Eigen::VectorXd high;

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::string_view kTooDamped = "its damping grows without bound";
 
-// How far a mode swings the nozzle, up to a factor, if it is damped by at least that much.
+// How far a mode with at least this damping swings the nozzle, up to a factor.
 double swing_of(const ModeOfAxis& mode, double least_damping = 0.0) {
   return std::abs(mode.gain) / (std::max(mode.damping_ratio, least_damping) * mode.freq_hz);
 }
@@ -119,7 +119,7 @@ bool has_mode_near(const Eigen::VectorXd& theta, double freq_log) {
   return false;
 }
 
-// How (log f, log ζ, g) of another fit differ, for each mode of the best from its nearest.
+// The differences of another fit's (log f, log ζ, g): each mode of the best against its nearest.
 Eigen::VectorXd difference(const std::vector<ModeOfAxis>& best,
                            const std::vector<ModeOfAxis>& other) {
   constexpr double kFarthest = 0.15;
@@ -138,9 +138,9 @@ Eigen::VectorXd difference(const std::vector<ModeOfAxis>& best,
   return result;
 }
 
-// Takes a solution that is `worse` by the criterion for a rival, if it is nearly as good as the
-// best and its response differs from that of all before. A machine may well be damped more than a
-// fit is trusted with.
+// Takes a solution that is `worse` by the criterion as a rival, if it is nearly as good as the best
+// and its response differs from all rivals before. A machine may well be damped more than a trusted
+// fit allows.
 void add_rival(const Solution& solution, double worse, const Band& band, const ModesModel& model,
                Choice& choice) {
   constexpr double kNearlyEqual = 6.0;

@@ -1,4 +1,4 @@
-// Which of the fits of a record to trust.
+// Chooses the fit of a record to trust.
 #pragma once
 
 #include <string>
@@ -21,14 +21,14 @@ struct Choice {
   Eigen::VectorXd theta;           // of the best, or else of the closest; main mode first
   std::vector<Rival> rivals;
   std::string doubt;       // of the closest of all, where it is not the best
-  double closer_by = 0.0;  // by how much the closest of all is the better one then
+  double closer_by = 0.0;  // how much better the closest of all then is
   Eigen::MatrixXd spread;  // of (log f, log ζ, g) among the fits that nearly equal the best
 };
 
-// Whether main modes differ between rivals, so that the record leaves open which one it is.
+// Whether the rivals have other main modes, so that the record leaves the main mode open.
 [[nodiscard]] bool has_other_main(const Choice& choice);
 
-// `found` as search() finds it.
+// `found`: the result of search().
 [[nodiscard]] Choice choose(const std::vector<std::vector<Solution>>& found, const Band& band,
                             const ModesModel& model);
 

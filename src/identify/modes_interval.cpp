@@ -77,7 +77,7 @@ Eigen::MatrixXd root_of(const Eigen::MatrixXd& covariance) {
   return parts.eigenvectors() * parts.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
 }
 
-// A step that goes no farther than H changes about evenly with (log f, log ζ, g).
+// Shortens a step so far that H changes about evenly with (log f, log ζ, g) along it.
 Eigen::VectorXd shortened(const Eigen::VectorXd& step) {
   constexpr double kFreq = 0.1;
   constexpr double kDamping = 0.7;

@@ -1,4 +1,4 @@
-// What a record leaves open around a fit.
+// The uncertainty that a record leaves around a fit.
 #pragma once
 
 #include <vector>
@@ -7,12 +7,12 @@
 
 namespace unflex::identify {
 
-// Covariance of (log f, log ζ, g) for each mode of θ, from one whose first rows are those of the
-// modes in θ; g_i = a_i / Σ a.
+// Covariance of (log f, log ζ, g) for each mode of θ, with g_i = a_i / Σ a. It follows from
+// `covariance`, whose first rows belong to the modes in θ.
 [[nodiscard]] Eigen::MatrixXd of_gains(const Eigen::MatrixXd& covariance,
                                        const Eigen::VectorXd& theta);
 
-// Likewise for a fit to a spectrum.
+// Covariance of (log f, log ζ, g) for each mode of a fit to a spectrum.
 [[nodiscard]] Eigen::MatrixXd covariance_of_modes(const ModesModel& model, const Band& band,
                                                   const Prior& prior, const Eigen::VectorXd& theta);
 

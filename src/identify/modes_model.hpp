@@ -26,7 +26,7 @@ class ModesModel {
   [[nodiscard]] Eigen::ArrayXd noise_density(const Eigen::VectorXd& theta) const;
   // Correlation of the scatter of bins k apart: the window makes neighbours alike.
   [[nodiscard]] double correlation(Eigen::Index apart) const;
-  // How many independent bins tell as much as those of the band.
+  // The number of independent bins that tell as much as the bins of the band.
   [[nodiscard]] double independent_bins() const;
   [[nodiscard]] const Eigen::ArrayXd& freq_hz() const { return freq_hz_; }
 

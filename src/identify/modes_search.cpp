@@ -86,8 +86,8 @@ std::vector<double> places_for_mode(const Band& band, const Solution* base) {
   return places;
 }
 
-// Gains that nearly cancel can draw any shape. So Σ|g| beyond a machine's counts like a bin that is
-// off; the values get a last row for it.
+// Gains that nearly cancel can draw any shape. So a Σ|g| larger than a machine's counts like a bin
+// that is off. The values get a last row for it.
 void append_cancelling(const Eigen::VectorXd& theta, Eigen::ArrayXd& values,
                        Eigen::MatrixXd* jacobian) {
   constexpr double kMostOfAllGains = 1.7;
@@ -257,9 +257,9 @@ class Search {
 
 }  // namespace
 
-// What is known before: damping ratios are about 0.08 within a factor of 2.2, amplitudes are of the
-// order of 1, and noise is somewhere below the motion. All of it is weak: it holds what the record
-// leaves open. Precisions are for a scatter of 0.2 of the logarithm.
+// The knowledge before the fit: damping ratios are about 0.08 within a factor of 2.2, amplitudes
+// are of the order of 1, and noise is somewhere below the motion. The knowledge is weak: it holds
+// only what the record leaves open. Precisions are for a scatter of 0.2 of the logarithm.
 Prior prior_of(const Eigen::VectorXd& theta, const Sweep& sweep) {
   constexpr double kVariance = 0.04;
   const Eigen::Index modes = modes_in(theta);

@@ -17,7 +17,7 @@ struct Solution {
   bool is_minimum_phase = true;
 };
 
-// What is known of θ before: where noise does not rise, N₁ is held.
+// The knowledge of θ before the fit. If noise does not rise, N₁ is held.
 [[nodiscard]] Prior prior_of(const Eigen::VectorXd& theta, const Sweep& sweep);
 
 // Without modes: the tool moves as the base does.

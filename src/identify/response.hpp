@@ -1,4 +1,4 @@
-// What a sweep excites, and how measured and fitted values compare.
+// The excitation of a sweep, and the comparison of measured and fitted values.
 #pragma once
 
 #include <Eigen/Core>

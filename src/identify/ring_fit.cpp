@@ -31,7 +31,7 @@ constexpr double kMostDamping = 0.4;
 
 using Known = std::vector<ModeOfAxis>;
 
-// e^(−ζωt) cos ω_d t and e^(−ζωt) sin ω_d t. A ζ above the greatest counts as that.
+// e^(−ζωt) cos ω_d t and e^(−ζωt) sin ω_d t. A ζ above kGreatest counts as kGreatest.
 struct Swings {
   Eigen::ArrayXd cosine;
   Eigen::ArrayXd sine;
@@ -233,7 +233,7 @@ Result<RecordFit> fit_ringing(const std::vector<double>& samples, double rate_hz
   record.unexplained = std::min(
       1.0, std::sqrt(ring->fit.residual.head(shown).square().sum() / signal.square().sum()));
   constexpr double kTooMuch = 0.5;
-  // What sounds on for a hundred periods, or faster than any belt swings, is a motor's step.
+  // A vibration that lasts a hundred periods, or is faster than any belt swings, is a motor's step.
   constexpr double kLeastDamping = 0.005;
   constexpr double kFastest_hz = 180.0;
   if (record.unexplained > kTooMuch) {

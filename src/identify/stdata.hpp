@@ -14,7 +14,7 @@ namespace unflex::identify {
 
 [[nodiscard]] bool is_stdata(std::string_view bytes);
 
-// Errors are as those of parse_records().
+// Errors are those of parse_records().
 [[nodiscard]] Result<std::vector<DataSet>> parse_stdata(std::string_view bytes,
                                                         const std::string& file);
 

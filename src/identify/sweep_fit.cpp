@@ -39,7 +39,7 @@ constexpr double kGroup_hz = 0.04;
 // At lower frequencies the slow to and fro that newer Klippers add to the sweep is stronger.
 constexpr double kLowest_hz = 12.0;
 
-// So many standard deviations above the model, a value is a line of this to and fro: noise and
+// A value this many standard deviations above the model is a line of the slow to and fro. Noise and
 // ripple do not get there.
 constexpr double kOutlier = 8.0;
 
@@ -75,7 +75,7 @@ Eigen::ArrayXd noise_of(const Eigen::ArrayXd& freq_hz, const Eigen::VectorXd& p)
   return math::exp(p[p.size() - 2]) + math::exp(p[p.size() - 1]) * noise_rise(freq_hz);
 }
 
-// What mode m alone would give at frequencies ν.
+// The answer of mode m alone at frequencies ν.
 Eigen::ArrayXcd answer(const Eigen::ArrayXd& freq_hz, const Eigen::VectorXd& p, Eigen::Index m) {
   return p[3 * m + 2] * mode_response(freq_hz, math::exp(p[3 * m]), math::exp(p[3 * m + 1]));
 }
@@ -130,8 +130,8 @@ Eigen::VectorXd start_of(const FineBand& band, const Eigen::ArrayXd& excitation,
   return start;
 }
 
-// Whether the fine fit found the modes of the coarse one. If not, the record is not what it takes
-// it for: the base's motion is not even, or the noise is of another kind.
+// Whether the fine fit found the modes of the coarse one. If not, the record breaks the assumptions
+// of the fit: the base's motion is not even, or the noise is of another kind.
 bool agrees(const Eigen::VectorXd& fine, const Eigen::VectorXd& coarse) {
   constexpr double kMain = 0.02;
   constexpr double kOther = 0.06;

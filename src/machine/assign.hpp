@@ -13,11 +13,11 @@ namespace unflex::machine {
 
 struct NamedValue;
 
-// A value that was converted from another unit, without the noise of that: firmwares keep seven
-// digits.
+// A value that was converted from another unit, without the rounding noise of the conversion:
+// firmwares keep seven digits.
 [[nodiscard]] double as_written(double value);
 
-// What a source may hold for a key. monostate stands for a value that no key takes.
+// A value that a source may hold for a key. monostate stands for a value that no key takes.
 struct Value {
   Value(double number);
   Value(bool flag);
@@ -63,7 +63,7 @@ struct Assignment {
   SourcePlace place;
 };
 
-// What a reader understood of a printer's or a slicer's own settings.
+// The settings that a reader has understood in a printer's or a slicer's own form.
 struct Reading {
   std::vector<Assignment> assignments;  // if a key occurs twice, the later wins
   std::vector<Note> notes;

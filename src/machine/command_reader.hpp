@@ -1,6 +1,6 @@
-// Settings written as the firmware's own commands: what the readers of Marlin's M503 and of
-// RepRapFirmware's config.g share. Each command means what it means in a print, so the interpreter
-// reads it.
+// Settings written as the firmware's own commands. The readers of Marlin's M503 and of
+// RepRapFirmware's config.g share this part. Each command means what it means in a print, so the
+// interpreter reads it.
 #pragma once
 
 #include <array>
@@ -19,7 +19,7 @@ namespace unflex::machine {
 
 // The axes as keys spell them.
 inline constexpr std::array<std::string_view, 4> kAxes = {"x", "y", "z", "e"};
-// How a message ends that refuses a machine.
+// The end of a message that refuses a machine.
 inline constexpr std::string_view kNotSupported =
     "unflex does not support yet; print the sliced file as it is on it";
 
@@ -36,8 +36,8 @@ class CommandReader {
   // notes that it is not taken and returns false.
   bool take(const std::string& text, const gcode::Command& command, const SourcePlace& place);
 
-  // Adds the tool's limits from those of X and Y. The motors' limits follow from them: velocity
-  // enough for the faster axis, acceleration not too much for the weaker.
+  // Derives the tool's limits from the limits of X and Y, and adds them. The motors' limits follow
+  // from them: velocity enough for the faster axis, acceleration not too much for the weaker.
   void finish();
 
   // A shaper's frequency is the resonance as it was measured.

@@ -40,8 +40,8 @@ struct Draft {
   // Parallel to key_table(): where the key was given last; empty while it has its default.
   std::vector<std::optional<SourcePlace>> places;
   std::string printer_file;  // the name it goes by in messages; empty if none is given
-  // What a message about a setting that is not there ends with, if the printer file names other
-  // files that could not be read.
+  // The end of a message about a missing setting, if the printer file names other files that could
+  // not be read.
   std::string maybe_elsewhere;
 };
 

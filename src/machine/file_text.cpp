@@ -13,7 +13,8 @@
 namespace unflex::machine {
 namespace {
 
-// Printer files have some kilobytes; whoever passes a print by mistake hears so at once.
+// Printer files have some kilobytes. This limit makes a print that is passed by mistake an error at
+// once.
 constexpr std::size_t kMaxFileBytes = 1U << 20U;
 
 }  // namespace

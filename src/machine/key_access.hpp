@@ -1,5 +1,5 @@
-// What the rows of the table of keys are made of: how a key comes to its member, and to the value
-// in force while it is unset.
+// The parts of the rows in the table of keys: access from a key to its member, and to the value in
+// force while the member is unset.
 #pragma once
 
 #include <cstddef>

@@ -36,8 +36,8 @@ struct Key {
   Bounds bounds;  // only for numbers
   std::string_view unit;
   std::string_view meaning;
-  // For optional members: what holds while unset, in words, and as a number if there is one. A
-  // number that is not finite stands for none.
+  // For optional members: the value in force while the member is unset, in words, and as a number
+  // if there is one. A number that is not finite stands for none.
   std::string_view if_unset = {};
   double (*in_force)(const Settings&) = nullptr;
   // The words that a text may be; empty: any text.

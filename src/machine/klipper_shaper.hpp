@@ -1,4 +1,4 @@
-// What the frequency of a Klipper's input shaper says of the resonance behind it.
+// The resonance behind the frequency of a Klipper's input shaper.
 #pragma once
 
 #include <optional>

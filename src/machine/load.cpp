@@ -26,7 +26,7 @@
 namespace unflex::machine {
 namespace {
 
-// How the key of several modes ends, which is the origin of what follows from it.
+// The end of the key of several modes. This key is the origin of the values that follow from it.
 constexpr std::string_view kModes = ".mode";
 constexpr std::string_view kPlants = ".plant";
 
@@ -42,7 +42,8 @@ std::string origin_text(const std::optional<SourcePlace>& place) {
   return place->line == 0 ? place->file : fmt::format("{}:{}", place->file, place->line);
 }
 
-// Whether the key is one mode's, on an axis that has several: its value is then the largest mode's.
+// Whether the key describes one mode, but its axis has several. The key's value is then the largest
+// mode's.
 bool is_of_modes(const Draft& draft, std::string_view key) {
   const auto is_of = [&](std::string_view axis, const AxisDynamics& dynamics) {
     return !dynamics.modes.empty() && key.starts_with(fmt::format("dynamics.{}.", axis)) &&
@@ -135,7 +136,7 @@ void note_unknown_resonances(Draft& draft) {
                    draft.maybe_elsewhere)});
 }
 
-// Printers swing between some 20 and 120 Hz. What is far from that is mostly in another unit.
+// Printers swing between some 20 and 120 Hz. A value far from this range is mostly in another unit.
 void note_odd_frequencies(Draft& draft) {
   constexpr double kLeast_hz = 10.0;
   constexpr double kMost_hz = 200.0;
@@ -156,7 +157,7 @@ void note_odd_frequencies(Draft& draft) {
   for_each_axis(note, kAxisKeys, draft.settings.dynamics);
 }
 
-// A value of the user's own counts all the same.
+// Notes odd damping ratios. They count all the same.
 void note_odd_dampings(Draft& draft) {
   const auto note = [&](std::string_view axis, const AxisDynamics& dynamics) {
     const std::string key = dynamics_key(axis, "damping_ratio");

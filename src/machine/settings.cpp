@@ -149,7 +149,7 @@ double Settings::min_line_s() const {
 }
 
 double Settings::least_speed_step_mm_s() const {
-  // The base always has to accelerate that many times as much as the plan.
+  // The base always has to accelerate this many times as much as the plan.
   constexpr double kLeastHeadroom = 1.2;
   return kLeastHeadroom * limits.max_accel_mm_s2 * min_line_s() / kSpeedStepShare;
 }
@@ -243,7 +243,7 @@ double Settings::base_max_accel_mm_s2(double asked_mm_s2) const {
   if (base.max_accel_mm_s2) {
     return *base.max_accel_mm_s2;
   }
-  // Where emit.accel_mm_s2 does not follow this limit, it bounds it.
+  // If emit.accel_mm_s2 does not follow the base's acceleration, it bounds the base's acceleration.
   const bool bounded = emit.accel_mm_s2 || !spec().defaults.emit_accel_follows_base;
   const double most = bounded ? emit.accel_mm_s2.value_or(kEmitAccel_mm_s2) / kEmitAccelFactor
                               : std::numeric_limits<double>::infinity();
@@ -405,7 +405,7 @@ Axes<double> Settings::shaper_freq_hz() const {
 }
 
 // Any printer may have a shaper. On the Snapmaker J1 the command that switches it off does harm
-// (variants.cpp), so there only one that is told of is taken for there.
+// (variants.cpp), so on this printer a shaper counts only if a source tells of it.
 Axes<bool> Settings::shaper_unknown() const {
   Axes<bool> unknown = map_axes(
       [&](const std::optional<double>& told) { return !told && printer.variant != "snapmaker_j1"; },

@@ -1,4 +1,4 @@
-// What a slicer wrote into a print about the printer it was sliced for.
+// The settings of the printer that a slicer wrote into a print.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-// What kind of file describes a printer, told by its content.
+// The kinds of files that may describe a printer, told by their content.
 #pragma once
 
 #include <string_view>

@@ -1,4 +1,4 @@
-// Where the moves of a test go.
+// Places for the moves of a test.
 #pragma once
 
 #include <fmt/core.h>

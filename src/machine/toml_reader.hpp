@@ -8,7 +8,7 @@
 
 namespace unflex::machine {
 
-// What the place of an override begins with.
+// The beginning of the place of an override.
 inline constexpr std::string_view kOverrideMark = "--set ";
 
 // Reads a printer file into the draft; `name` is its name in messages.

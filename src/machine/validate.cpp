@@ -35,7 +35,6 @@ Status each_in_turn(Check&& check, Values&&... values) {
   return first;
 }
 
-// A firmware needs some room above the base's acceleration to follow dense lines.
 // With fewer nodes per period of resonance, the optimum is worse than a ZV shaper's.
 constexpr double kLeastNodesPerPeriod = 10.0;
 
@@ -112,8 +111,9 @@ Status check_mass_keys(const Draft& draft, const std::string& section) {
   return {};
 }
 
-// Several modes or one: what is overridden counts, of two from the same source neither can. Sets
-// the frequency and damping of an axis with several modes to those of its largest.
+// Decides between the forms of an axis, several modes or one. The form that an override gives
+// counts. Both forms from the same kind of source are an error. Sets the frequency and damping of
+// an axis with several modes to those of its largest mode.
 Status resolve_modes(const Draft& draft, const std::string& section, AxisDynamics& axis) {
   if (axis.modes.empty()) {
     return {};
@@ -142,7 +142,7 @@ Status resolve_modes(const Draft& draft, const std::string& section, AxisDynamic
   return {};
 }
 
-// The plants of a file belong to its model. Whoever overrides that model leaves them behind.
+// The plants of a file belong to its model. An override of the model drops them.
 void resolve_plants(const Draft& draft, const std::string& section, AxisDynamics& axis) {
   const auto is_set = [&](std::string_view name) {
     return is_overridden(draft, fmt::format("{}.{}", section, name));

@@ -18,7 +18,7 @@ class FileStore final : public TextStore {
   [[nodiscard]] std::unique_ptr<std::ostream> write() override { return write_file(name_); }
   [[nodiscard]] std::optional<std::uint64_t> bytes() const override { return file_bytes(name_); }
 
-  // What the text grows by is held in memory.
+  // Text by which the file grows is held in memory.
   [[nodiscard]] bool rewrite(const LineChange& change) override {
     std::unique_ptr<std::iostream> file = change_file(name_);
     std::string chunk(kChunk, '\0');

@@ -1,4 +1,4 @@
-// How the system parts the names of folders.
+// The characters that separate the names of folders.
 #pragma once
 
 #include <string_view>
@@ -7,8 +7,8 @@ namespace unflex::platform {
 
 extern const std::string_view kSeparators;
 
-// The part of a name that leads to the top: 1 for "/a", 3 for "C:\a"; 0 if the name counts from
-// where one is.
+// The length of the part of a name that leads to the top: 1 for "/a", 3 for "C:\a"; 0 for a name
+// that counts from the current folder.
 [[nodiscard]] std::size_t root_length(std::string_view name);
 
 }  // namespace unflex::platform

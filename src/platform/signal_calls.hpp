@@ -3,7 +3,7 @@
 
 namespace unflex::platform {
 
-// What each system does.
+// Functions that each system implements.
 //
 // Calls remember_signal() for each signal that asks the process to end, and give_up() some time
 // after the first. Writing to a closed pipe and the like is an error from here on.
@@ -13,7 +13,7 @@ void call_off_giving_up();
 bool remove_at_once(const char* name);
 [[noreturn]] void end_at_once(int exit_code);
 
-// Whether it is the first.
+// Notes a signal. Returns whether it is the first.
 bool remember_signal(int signal);
 [[noreturn]] void give_up();
 

@@ -13,7 +13,7 @@ namespace {
 constexpr int kMostIterations = 60;
 constexpr double kFirstMultiplier = 1.0;
 constexpr double kFirstBreach = 0.1;
-// The share of the way to the nearest bound that a step goes.
+// A step goes this share of the way to the nearest bound.
 constexpr double kOfTheWay = 0.99;
 // Weight on the diagonal that holds a fixed unknown.
 constexpr double kFixed = 1e12;
@@ -26,7 +26,7 @@ constexpr double kStiff = 1e-6;
 template <int W>
 using Width = std::integral_constant<int, W>;
 
-// W × W, by columns. Above the diagonal it means nothing.
+// W × W, by columns. Entries above the diagonal are not used.
 template <int W>
 using Block = std::array<double, W * W>;
 

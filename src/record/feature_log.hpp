@@ -1,5 +1,5 @@
-// What slicers say in comments about the lines that follow: kind of feature (gcode/feature.hpp),
-// new layer (gcode/layer_mark.hpp).
+// Reads slicers' comments about the lines that follow: kind of feature (gcode/feature.hpp), new
+// layer (gcode/layer_mark.hpp).
 #pragma once
 
 #include <cstddef>

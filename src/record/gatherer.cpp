@@ -59,8 +59,8 @@ void Recorder::Gatherer::line(const gcode::Line& line) {
 
 void Recorder::Gatherer::section(const verify::ReferencePath& sliced,
                                  const verify::ReferencePath& emitted) {
-  // Under the printer's own shaper a nozzle may still be in the section before. Then it goes on
-  // there, by the numbers of the sliced file's path.
+  // Under the printer's own shaper a nozzle may still be in the section before. Then it goes on in
+  // that section, by the numbers of the sliced file's path.
   std::size_t needed = sliced.end();
   for (int number : {0, 1}) {
     Version& version = versions_[number];
@@ -184,7 +184,7 @@ std::size_t Recorder::Gatherer::layer_of(const verify::PathPiece& piece, std::si
   return layers_.size() - 1;
 }
 
-// What was laid before the first layer is not the print: lines that prime the nozzle.
+// Lines before the first layer prime the nozzle and are not part of the print.
 void Recorder::Gatherer::leave_start() {
   start_layers_ = layers_.size();
   for (Version& version : versions_) {
@@ -199,7 +199,7 @@ void Recorder::Gatherer::leave_start() {
 void Recorder::Gatherer::close_chunk(int number, double to_mm) {
   Version& version = versions_[number];
   if (version.chunk.contour2_max_mm2 < 0.0 || !version.laid) {
-    return;  // what comes out before the first line belongs to that
+    return;  // filament that comes out before the first line belongs to that line
   }
   const Chunk chunk = std::exchange(version.chunk, Chunk{});
   const PathMove& move = cells_[version.where.move];

@@ -45,7 +45,7 @@ class Recorder::Gatherer final : public verify::Observer {
     XY max_at_mm;  // where the reference was at the largest deviation
     std::size_t max_line = 0;
   };
-  // What belongs to a move that lays filament. Some may come out behind its end, in travel.
+  // Data of a move that lays filament. Some filament may come out behind the move's end, in travel.
   struct Laid {
     std::size_t layer = 0;
     std::size_t feature = 0;
@@ -80,7 +80,7 @@ class Recorder::Gatherer final : public verify::Observer {
     std::size_t first_line = 0;
     std::array<Sums, 2> sums;
   };
-  // What both nozzles do around a place.
+  // The motion of both nozzles around a place.
   struct Scene {
     std::size_t id = 0;
     std::array<std::vector<report::Moment>, 2> moments;

@@ -56,8 +56,8 @@ dynamics::ShaperPulses earlier(const dynamics::ShaperPulses& pulses, double shif
   return result;
 }
 
-// Some firmwares delay the whole motion. What the axes have of that in common only makes the print
-// late. It is taken away, because the bench looks for the nozzle near where the plan is.
+// Some firmwares delay the whole motion. The part of the delay that both axes share only makes the
+// print late. It is taken away, because the bench looks for the nozzle near where the plan is.
 PrinterShaper without_common_delay(const PrinterShaper& shaper) {
   const double shift_s = 0.5 * sum_of_axes(mean_delay_s, shaper.pulses);
   return {shaper.name,

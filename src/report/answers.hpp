@@ -1,5 +1,5 @@
-// What a user asks first: is it better than what the printer does now, where is it worst, and is it
-// safe to print?
+// A user's first questions: is it better than what the printer does now, where is it worst, and is
+// it safe to print?
 #pragma once
 
 #include <optional>
@@ -17,7 +17,7 @@ struct Comparison {
   std::optional<double> zv_mm;  // under a ZV shaper, if that was measured
 };
 
-// Where the printer's own shaper acts, it is what the file is compared with, and ZV is left out.
+// Where the printer's own shaper acts, the file is compared with that shaper, and ZV is left out.
 struct Better {
   std::string now;  // "without an input shaper"
   Comparison exact;
@@ -32,19 +32,20 @@ struct Better {
 [[nodiscard]] double times_smaller(const Comparison& comparison);
 [[nodiscard]] Better better(const Report& report);
 
-// Where the timing is free: "9.8s → 6.3s to print, 36 % less; the nozzle may stray 20 µm and keeps
-// to it", and what a narrower band of frequencies would save, if that is worth it. Empty: the
-// timing is as sliced.
+// Texts for a free timing: "9.8s → 6.3s to print, 36 % less; the nozzle may stray 20 µm and keeps
+// to it", and the time that a narrower band of frequencies would save, if it is worth it. Empty:
+// the timing is as sliced.
 [[nodiscard]] std::vector<std::string> faster_texts(const Report& report);
 
-// What an eye sees of waves on a wall that is held into light from one side (docs/tune.md).
+// The height of waves that an eye sees on a wall that is held into light from one side
+// (docs/tune.md).
 inline constexpr double kSeen_mm = 0.008;
 
-// What to say of a print that strays less than an eye sees as sliced, but for one hundredth of the
-// time, so that compensating it shows little. nullopt: of another print, or of one made for speed.
+// A remark on a print that compensating hardly improves: as sliced it strays less than an eye sees,
+// but for one hundredth of the time. nullopt: any other print, or one made for speed.
 [[nodiscard]] std::optional<std::string> hardly_worth_it(const Report& report);
 
-// What to say of the width of the line: how far it is off, or how to find out.
+// A text on the width of the line: how far it is off, or how to find out.
 [[nodiscard]] std::string width_text(const Report& report);
 
 struct Worst {
@@ -55,7 +56,7 @@ struct Worst {
 };
 [[nodiscard]] Worst worst(const Report& report);
 
-// As the slicer counts, from 1 on; 0 before its first layer.
+// The number of a layer as the slicer counts, from 1 on; 0 before its first layer.
 [[nodiscard]] std::size_t slicers_layer(const Recording& recording, std::size_t layer);
 
 // "layer 12", as slicers_layer() counts.
@@ -64,8 +65,8 @@ struct Worst {
 [[nodiscard]] std::string place_text(const Recording& recording, const Place& place);
 
 struct Safe {
-  bool is_safe = true;               // no rule is broken
-  double times_own_accel = 0.0;      // what motors are asked for, over the printer's own limit
+  bool is_safe = true;           // no rule is broken
+  double times_own_accel = 0.0;  // acceleration asked of the motors, over the printer's own limit
   std::vector<std::string> reasons;  // a sentence each
 };
 [[nodiscard]] Safe safe(const Report& report);

@@ -256,8 +256,8 @@ void write_curve(Sink out, const PlotCurve& curve, const Frame& frame) {
                  path, curve.colour, curve.width_px, dashes(curve.stroke));
 }
 
-// Axes and curves. The clipping is that of an inner viewport, since a clip path would need an
-// identifier that is unique in the page.
+// Axes and curves. An inner viewport clips them, since a clip path would need an identifier that is
+// unique in the page.
 void write_plot(Sink out, const Plot& asked) {
   const Plot plot = asked.log_x ? in_logarithms(asked) : asked;
   const Frame frame(plot);

@@ -158,7 +158,7 @@ void write_line(Sink out, const verify::LineStats& before, const verify::LineSta
                  change(verify::OtherHotend::more_pressure), change(verify::OtherHotend::later));
 }
 
-// What the printer's own shaper leaves out of the figures before.
+// The figures without the printer's own shaper, which is on in the figures before.
 void write_unshaped(Sink out, const std::optional<verify::Deviation>& unshaped) {
   if (unshaped) {
     const verify::DeviationStats& row = unshaped->extruding;
@@ -276,7 +276,7 @@ void write_path(Sink out, const Report& r) {
   }
 }
 
-// Most prints ask for as much as before, and then nobody needs to know.
+// Most prints ask for no more flow than before. Then the line is left out.
 void write_flow(Sink out, const Report& r) {
   constexpr double kAsBefore = 1.02;
   const verify::FlowStats& before = r.measured.uncompensated.flow;
@@ -356,7 +356,7 @@ std::string width_change_text(const verify::LineStats& before, const verify::Lin
 }
 
 std::string percent_change_text(double from, double to) {
-  // The figures of micrometres_text(), which counts thousandths of a millimetre.
+  // micrometres_text() counts thousandths of a millimetre, so percents are scaled to them.
   constexpr double kPercent = 100.0;
   return fmt::format("{} → {}", micrometres_text(from * kPercent / kMicrometresPerMm),
                      micrometres_text(to * kPercent / kMicrometresPerMm));
@@ -409,7 +409,7 @@ std::string share_text(double share) {
 
 std::string setting_text(std::string_view value) {
   constexpr std::string_view kOfNumbers = "0123456789.+-e";
-  // Numbers stand behind these: [-4.5, 235], {freq_hz = 45, gain = 1}.
+  // A number may follow one of these: [-4.5, 235], {freq_hz = 45, gain = 1}.
   constexpr std::string_view kBefore = "[, ";
   std::string text;
   bool quoted = false;

@@ -134,8 +134,8 @@ const dynamics::NozzleState& NozzleWalk::at(double t) {
   const AxisPath& path = *path_;
   while (t - now_s_ > kSameTime_s) {
     const dynamics::BaseSegment base = motion_at(path, index_, now_s_);
-    // The next change is the beginning of the first parabola while that is still to come, later
-    // that of the next one.
+    // The next change is the beginning of the first parabola while it is still to come, later the
+    // beginning of the next parabola.
     const bool waiting = now_s_ + kSameTime_s < path[index_].start_s;
     const std::size_t next = waiting ? index_ : index_ + 1;
     const double change_s = next < path.size() ? path[next].start_s : t;

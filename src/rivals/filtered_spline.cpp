@@ -81,7 +81,7 @@ std::vector<double> filtered_basis(const BasisTable& table, const dynamics::Flex
   return result;
 }
 
-// Finds the coefficients one after the other, and keeps what is left of the reference for the next
+// Finds the coefficients one after the other, and keeps the rest of the reference for the next
 // ones.
 class Preview {
  public:

@@ -79,8 +79,8 @@ double vibration_of(const ShaperPulses& pulses, const Bins& bins) {
   return worst;
 }
 
-// How far a shaper leads off the path: a right angle, which is taken at kCalibrationCorner_mm_s,
-// and a reversal. Both are linear in the acceleration.
+// How far a shaper leads off the path at a right angle, which is passed at kCalibrationCorner_mm_s,
+// and at a reversal. Both are linear in the acceleration.
 struct Smoothing {
   double corner_mm = 0.0;
   double corner_per_accel_s2 = 0.0;
@@ -108,7 +108,7 @@ double smoothing_mm(const ShaperPulses& pulses) {
                   kAccel_mm_s2 * of.reversal_per_accel_s2);
 }
 
-// At all frequencies, the lowest first.
+// The shaper at all frequencies, the lowest first.
 std::vector<FittedShaper> tried(const Candidate& candidate, const Bins& bins) {
   constexpr double kMostOfShaper_hz = 150.0;
   constexpr double kStep_hz = 0.2;
@@ -125,7 +125,7 @@ std::vector<FittedShaper> tried(const Candidate& candidate, const Bins& bins) {
   return results;
 }
 
-// Not much worse than the one that leaves least, but much less smoothing.
+// The shaper that smooths much less than the one that leaves least, but leaves not much more.
 FittedShaper selected(const std::vector<FittedShaper>& results) {
   // Among equals the highest frequency counts.
   const auto least =

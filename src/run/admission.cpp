@@ -10,7 +10,7 @@ namespace unflex::run {
 namespace {
 
 // The trajectory of a run or part is held as a whole, 48 bytes per node. A run or part with more
-// nodes is kept. Only a single move can make a part so long.
+// nodes is kept. Only a single long move can make a part exceed this limit.
 constexpr std::size_t kMaxRunNodes = 8'000'000;
 // A plan may come out above a limit by rounding.
 constexpr double kRounding = 1.0 + 1e-6;
@@ -74,7 +74,8 @@ void Admission::keep_lines(RunJob& job) {
   keep_as_sliced(job);
 }
 
-// Sets what the run is worked out with. Returns the largest acceleration that its plan asks for.
+// Sets the values with which the run is worked out. Returns the largest acceleration that its plan
+// asks for.
 double Admission::prepare(RunJob& job) {
   const Piece& piece = job.piece;
   job.nozzle = nozzle_at(piece);
@@ -136,7 +137,7 @@ void Admission::warn_if_capped(const RunSetup& setup, const Piece& piece) {
                   setup.asked_accel_mm_s2, setup.accel_by_lines_mm_s2)}));
 }
 
-// What earlier passes blamed the run for.
+// The objections for which earlier passes blamed the run.
 std::vector<std::string> Admission::blamed_before(const Piece& piece) const {
   const std::size_t first = piece.moves.front().segment.line;
   const std::size_t last = piece.moves.back().segment.line;

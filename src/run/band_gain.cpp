@@ -11,7 +11,7 @@ namespace {
 constexpr double kNarrower = 0.5;
 // The share of the motion that is sampled.
 constexpr double kSampled = 0.06;
-// Runs of fewer moves prime the nozzle, or are like no other.
+// Runs of fewer moves prime the nozzle, or are not typical.
 constexpr std::size_t kFewest = 8;
 
 }  // namespace

@@ -18,8 +18,9 @@ constexpr double kAccelShare = 0.98;
 // counts.
 constexpr double kAccelShareOfFreeTiming = 0.93;
 
-// The largest acceleration at which the lines can follow a base that turns round. It goes as far as
-// the shortest line in the time of a line, at²/2. A quicker base turns where no line ends.
+// The largest acceleration at which the lines can follow a base that turns round. In the time of a
+// line, this base goes as far as the shortest line is long, at²/2. A quicker base turns where no
+// line ends.
 double accel_by_turns(const machine::Settings& settings, double asked_mm_s2) {
   // The base leads the nozzle, so it needs more than the sliced moves ask for.
   constexpr double kLeast = 1.4;

@@ -1,4 +1,4 @@
-// How much the base may accelerate so that its lines keep the limits.
+// The acceleration that the base may have so that its lines keep the limits.
 #pragma once
 
 #include "unflex/machine/machine.hpp"
@@ -18,7 +18,7 @@ namespace unflex::run {
 // The acceleration that the base may have so that the text stays within the limits. There is a
 // limit of acceleration and, if lines end on a fine grid, one of the change of speed from line to
 // line. Whole steps of a motor are too coarse for the second. asked_mm_s2: the largest that the
-// plan asks for. for_turns: also so that lines can follow where the base turns round.
+// plan asks for. for_turns: the acceleration also lets lines follow where the base turns round.
 [[nodiscard]] double planned_base_accel_mm_s2(const machine::Settings& settings, double asked_mm_s2,
                                               bool for_turns = true);
 

@@ -69,7 +69,7 @@ gcode::Segment continued(const gcode::Segment& last) {
   return line;
 }
 
-// What the printer makes of the text.
+// The text as the printer would carry it out.
 struct Replayed {
   std::optional<planner::PlannedMove>
       before;  // the last move before the text, if it is a later part

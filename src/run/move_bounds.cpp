@@ -26,7 +26,8 @@ timing::MoveBounds free_bounds(const planner::PlannedMove& move, const machine::
                                const planner::FirmwareConfig& config) {
   const gcode::Segment& segment = move.segment;
   timing::MoveBounds bounds = timing::bounds_by_axes(move, limits, config);
-  // What the nozzle may run ahead of its limit (timing::kKeptFeed) is left free in travel.
+  // The nozzle may run a little ahead of its limit (timing::kKeptFeed). Travel leaves this room
+  // free.
   constexpr double kOfTravel = 0.985;
   const double feed_mm_s = segment.extruding()
                                ? segment.feed_mm_s

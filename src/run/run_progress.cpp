@@ -9,8 +9,8 @@
 namespace unflex::run {
 namespace {
 
-// What is done of a run once its timing is found, where that is free, and once its windows are
-// solved. Its lines are left then.
+// The share of a run's work that is done once its timing is found, if it is free, and once its
+// windows are solved. Then its lines are left.
 constexpr double kTiming = 0.8;
 constexpr double kWindows = 0.9;
 

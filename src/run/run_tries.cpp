@@ -7,7 +7,8 @@
 namespace unflex::run {
 namespace {
 
-// Shares of the motors' acceleration for another timing, behind an optimal and behind a scaled one.
+// Shares of the motors' acceleration for another timing, after an optimal timing and after a scaled
+// one.
 constexpr std::array kScaledAfterOptimal = {1.0, 0.9, 0.8};
 constexpr std::array kScaledAgain = {0.9, 0.8, 0.7};
 // Shares of the motors' acceleration for a base that leaves a reserve to whole steps.
@@ -25,8 +26,8 @@ void solve(RunJob& run, const RunRules& rules) {
 Tries::Tries(const RunJob& job, std::string objection, bool whole_steps)
     : objection_(std::move(objection)) {
   if (job.retimed && !job.keeps_timing()) {
-    // Its lines may break a limit: what is rounded swings about what was optimised, and a free
-    // timing takes all that the motors give.
+    // The lines may break a limit, since the rounded motion swings about the optimised one, and a
+    // free timing takes all that the motors give.
     for (const double share : job.has_base() ? kScaledAfterOptimal : kScaledAgain) {
       tries_.push_back({Remedy::scaled, share});
     }

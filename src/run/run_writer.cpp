@@ -290,9 +290,9 @@ std::optional<std::string> RunWriter::write_run(const RunJob& job, std::string& 
   if (objection && (counts_steps || !fits(job))) {
     objection = try_run(job, plan(job, 1.0, 1.0), false, text);
   }
-  // Whole steps may make a line too quick, or the lines a few too many, and so may lines for a free
-  // timing, which takes all that the motors give. Aiming lower helps, but lines that may do less
-  // than their base follow it worse: what helps then is a base that does less.
+  // Lines that end on whole steps may be too quick, or a few too many. So may lines for a free
+  // timing, which takes all that the motors give. Aiming at lower limits helps, but lines whose
+  // limits are below their base's follow the base worse. Then a base that does less helps.
   for (const double share : kLower) {
     const bool breaks_limit = objection && !objection->starts_with(kWorse);
     if (objection && ((counts_steps && breaks_limit) || job.retimed)) {

@@ -16,9 +16,9 @@
 namespace unflex::run {
 namespace {
 
-// All models that the axis may have besides the one it is given as: the plants of the settings or
-// a mode that nobody knows of, and the edges of the band around that one, which share with it what
-// the others leave.
+// All models of the axis besides the given one. These are the plants of the settings or a model
+// with an unknown mode, and the edges of the band around the given model. The edges share with the
+// given model the share that the others leave.
 std::vector<compensate::Plant> plants(const machine::AxisDynamics& dynamics,
                                       const machine::Settings& settings) {
   const compensate::Band band{settings.freq_error(), settings.dynamics_error.damping};
@@ -157,7 +157,8 @@ compensate::Setup compensate_setup(const machine::Settings& settings) {
   setup.overlap_s = std::clamp(unseen_s, settings.solve.overlap_s, settings.solve.window_s);
   setup.travel_weight = settings.solve.travel_weight;
   setup.jerk_weight = settings.jerk_weight();
-  // What swings at the end of a run, travel before a wall for instance, is drawn by the next.
+  // A swing at the end of a run, of travel before a wall for instance, shows in the lines of the
+  // next run.
   constexpr double kEndWeight = 10.0;
   setup.end_weight = kEndWeight;
   if (settings.along_weight() < 1.0) {

@@ -2,7 +2,8 @@
 //
 // Planning a print takes a hundredth of the time that swinging a nozzle along it does. So the print
 // is planned at all points of the grid first, and the nozzle tries these in order of rising time
-// until it keeps the tolerance. What breaks it is left at the sample that makes this certain.
+// until it keeps the tolerance. A motion that breaks the tolerance is left at the sample that makes
+// this certain.
 #include "unflex/study/fastest.hpp"
 
 #include <fmt/core.h>
@@ -103,7 +104,7 @@ class LargestErrors {
     max_mm_ = std::max(max_mm_, error_mm);
   }
 
-  // Both grow with each error that is added.
+  // Both figures grow with each error that is added.
   [[nodiscard]] PathErrors errors() const {
     return {least_first_.size() == count_ ? least_first_.front() : 0.0, max_mm_};
   }
@@ -218,7 +219,8 @@ std::vector<std::optional<TimedMotion>> fastest(std::vector<Candidate> candidate
   std::ranges::sort(candidates, {}, [](const Candidate& one) {
     return std::tuple(one.time_s, one.limits.accel_mm_s2, one.limits.corner_mm_s);
   });
-  // The widest tolerance that has no motion yet comes first: what breaks it breaks the others too.
+  // The widest tolerance that has no motion yet comes first: a motion that breaks it breaks the
+  // others too.
   std::vector<std::size_t> open(tolerances_mm.size());
   std::iota(open.begin(), open.end(), 0U);
   std::ranges::sort(open, {}, [&](std::size_t i) { return tolerances_mm[i]; });

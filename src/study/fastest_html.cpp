@@ -23,7 +23,7 @@ using report::micrometres_text;
 using report::Stroke;
 using Sink = std::back_insert_iterator<std::string>;
 
-// How a contender is drawn, by its place among them; unflex is drawn as "after" is elsewhere.
+// The look of a contender, by its place among them. unflex looks as "after" does elsewhere.
 struct Look {
   std::string_view colour;
   Stroke stroke;

@@ -1,4 +1,4 @@
-// How text, page and picture of the fastest motions put what they share.
+// Wording that text, page and picture of the fastest motions share.
 #pragma once
 
 #include <string>

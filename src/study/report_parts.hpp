@@ -16,7 +16,7 @@
 
 namespace unflex::study {
 
-// How a report of a print begins.
+// The beginning of a report of a print.
 template <class Outcome>
 [[nodiscard]] report::Json head_json(const Outcome& outcome) {
   report::Json json;

@@ -45,7 +45,7 @@ void write_maxima(Sink out, const Outcome& outcome) {
   fmt::format_to(out, "\n");
 }
 
-// How far from its target the base comes to rest: there the thesis' methods fail.
+// The distance from its target at which the base comes to rest: here the thesis' methods fail.
 void write_gaps(Sink out, const Outcome& outcome) {
   fmt::format_to(out, "\n{:<28}", "base rests short by, µm");
   for (const CaseResult& result : outcome.cases) {
@@ -87,7 +87,7 @@ void write_case(Sink out, const CaseResult& result) {
   }
 }
 
-// A table of what each method needs that solves something, with a cell for each case.
+// A table for the methods that solve equations: the needs of each, with a cell for each case.
 template <class Cell>
 void write_needs(Sink out, const Outcome& outcome, std::string_view title, const Cell& cell) {
   std::size_t width = 6;

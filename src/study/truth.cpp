@@ -189,9 +189,9 @@ std::vector<dynamics::Mode> modes_from(const Eigen::VectorXd& p) {
   return modes;
 }
 
-// Whether the modes are those of a machine. Large gains that nearly cancel are a shape's, not its,
-// and so is a damping ratio on its bound, unless the mode lies beyond the band. In the lowest mode
-// of a chain of masses all move the same way, as they do at rest.
+// Whether the modes are those of a machine. Large gains that nearly cancel draw a shape, not a
+// machine. So does a damping ratio on its bound, unless the mode lies beyond the band.
+// In the lowest mode of a chain of masses all move the same way, as they do at rest.
 bool is_machine(const std::vector<dynamics::Mode>& modes) {
   constexpr double kApart = 0.15;
   constexpr double kNear = 1.03;

@@ -1,7 +1,7 @@
 // The nozzles of axes that are not quite as given, on the same base.
 //
-// To first order such a nozzle is off·∂p/∂ln ω away (flat_output.hpp). What is left of the
-// distance, d, is small, and is taken from the last motion found.
+// To first order, the nozzle of an axis whose ω differs by the share `off` is off·∂p/∂ln ω away
+// (flat_output.hpp). The rest of the distance, d, is small and is taken from the last motion found.
 #pragma once
 
 #include <algorithm>
@@ -41,7 +41,7 @@ class EdgeNozzles {
   // The nozzles at the end of the motion.
   [[nodiscard]] const std::vector<dynamics::NozzleXY>& ends() const { return ends_; }
 
-  // How far they swing if the base rests there from then on.
+  // The largest swing of these nozzles if the base rests at base_mm from then on.
   [[nodiscard]] double largest_swing_mm(XY base_mm) const {
     double largest = 0.0;
     for (std::size_t i = 0; i < edges_.size(); ++i) {

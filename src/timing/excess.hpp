@@ -1,4 +1,4 @@
-// How a motion stands to its three limits.
+// A motion's values relative to its three limits.
 #pragma once
 
 #include <algorithm>

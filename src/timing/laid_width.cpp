@@ -14,18 +14,18 @@ constexpr int kWidth = 5;
 using Program = quadratic::ElasticProgram<kWidth>;
 
 constexpr double kKnot_s = 2e-3;
-// Where the nozzle stands, time still counts a little.
+// This speed is added in the weights, so that time counts a little even where the nozzle stands.
 constexpr double kLeastSpeed_mm_s = 2.0;
 // The unknowns are in this unit.
 constexpr double kUnit_mm = 1e-3;
-// A limit that is broken by as much as it allows costs this many units² mm.
+// Exceeding a limit by 100 % costs this many units² mm.
 constexpr double kPrice = 1e3;
 constexpr double kGap = 1e-4;
-// Over so much way the width is looked at, and so near to where laying begins or ends it is not.
+// The width is taken over kBin_mm of way, but not within kEnds_mm of where laying begins or ends.
 constexpr double kBin_mm = 0.4;
 constexpr double kEnds_mm = 1.0;
 
-// The values of moments that are period_s apart, at the knots.
+// Interpolates values at moments that are period_s apart to the knots.
 std::vector<double> at_knots(std::span<const double> values, double period_s) {
   const double last = static_cast<double>(values.size() - 1);
   const auto count = static_cast<std::size_t>(std::ceil(last * period_s / kKnot_s)) + 1;
@@ -40,8 +40,8 @@ std::vector<double> at_knots(std::span<const double> values, double period_s) {
   return result;
 }
 
-// The change of ṗ over two knots on either side, of five neighbouring y, 1/s²: by central
-// differences.
+// The mean of p̈ over four knot periods as a function of five neighbouring y, 1/s²: the change of
+// ṗ, by central differences.
 Program::Gradient mean_accel(double slope_before_s, double slope_behind_s) {
   constexpr double kTwo = 2.0 * kKnot_s;
   const auto speed_at = [](Eigen::Index middle, double slope_s) {
@@ -96,7 +96,8 @@ std::optional<std::vector<double>> laid_too_much(const std::vector<double>& aske
   return result;
 }
 
-// The knots from `begin` to before `end`, between which filament is laid without a stop.
+// Notes the errors at the knots from `begin` to before `end`, between which filament is laid
+// without a stop.
 void note_errors(const std::vector<double>& laid_mm, const std::vector<double>& way_mm,
                  const std::vector<double>& x_mm, std::size_t begin, std::size_t end,
                  std::vector<double>& errors) {

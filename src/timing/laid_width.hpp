@@ -19,9 +19,10 @@
 
 namespace unflex::timing {
 
-// What is laid too much around each moment, as a share of what is asked for there: over 0.4 mm, as
-// verification looks at it, and not within 1 mm of where laying begins or ends. The moments are
-// `period_s` apart. laid_mm: V there; way_mm: how far the nozzle has come along the path.
+// The error of the filament laid around each moment, as a share of the filament asked for there. It
+// is taken over 0.4 mm, as in verification, and not within 1 mm of where laying begins or ends. The
+// moments are `period_s` apart. laid_mm: V there; way_mm: how far the nozzle has come along the
+// path.
 [[nodiscard]] std::vector<double> width_errors(std::span<const double> laid_mm,
                                                std::span<const double> way_mm, double period_s,
                                                const Extruder& extruder);

@@ -17,7 +17,8 @@ using Tuned = ScalingTunings;
 // Keeps the mean error above 0, which is divided by.
 constexpr double kNothing = 1e-6;
 
-// Each model's error on what goes along that axis, where errors of the other one lead off the path.
+// Each model's mean error over the pieces. A piece counts by the part of its direction that goes
+// along this axis, where errors of the other axis lead off the path.
 std::vector<double> errors_along(gcode::Axis along, const NozzleMeasure& measured,
                                  std::span<const planner::PlannedMove> pieces,
                                  const Allowances& allowances) {

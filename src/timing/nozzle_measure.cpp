@@ -25,9 +25,9 @@ constexpr double kTowardsReference = 0.01;
 // the width is used.
 constexpr double kOfLines = 0.86;
 // Lines do not end exactly where filament does, so a little of it may come a node earlier or later.
-// There the nozzle may stray so many times the tolerance.
+// There the nozzle may stray this many times the tolerance.
 constexpr double kBeside = 1.5;
-// So many nodes' looks are found for all nozzles together.
+// The looks of this many nodes are found at once, for all nozzles together.
 constexpr std::size_t kNodesAtOnce = 128;
 
 // The base between a node and the next, a look further. Its acceleration is linear there, and the
@@ -76,21 +76,21 @@ class Walk {
   struct AtNode {
     double error_mm = 0.0;
     double speed_mm_s = 0.0;
-    // Those of the pieces on which it lays filament.
+    // Tolerance and F of the pieces on which the nozzle lays filament.
     double tolerance_mm = std::numeric_limits<double>::infinity();
     double feed_mm_s = std::numeric_limits<double>::infinity();
-    double travel_mm_s = std::numeric_limits<double>::infinity();  // on the others
+    double travel_mm_s = std::numeric_limits<double>::infinity();  // on the other pieces
   };
 
-  // What all nozzles share between two looks.
+  // Data that all nozzles share between two looks.
   struct Look {
     Axes<dynamics::BaseSegment> base;
-    // At its end: the piece that the plan is on, and where on the path that is. nullopt: the plan
-    // has not begun, or has ended.
+    // The piece that the plan is on at the end of the look, and the plan's place on the path then.
+    // nullopt: the plan has not begun, or has ended.
     std::optional<std::size_t> now;
     double reference_mm = 0.0;
   };
-  // The looks behind each of these nodes, which go on from those of the call before.
+  // Finds the looks behind each of these nodes. They continue the looks of the previous call.
   void look(std::size_t first_node, std::size_t last_node, std::vector<Look>& looks) {
     const double h = base_.period_s;
     looks.clear();
@@ -208,7 +208,7 @@ class Walk {
       for (; settled_ < until; ++settled_) {
         walk_->add(nodes_, settled_, first_ + settled_, model_->times_tolerance, result);
       }
-      // The next one needs the last one beside it.
+      // The next node needs the last settled node beside it.
       const std::size_t dropped = settled_ > 0 ? settled_ - 1 : 0;
       nodes_.erase(nodes_.begin(), nodes_.begin() + static_cast<std::ptrdiff_t>(dropped));
       settled_ -= dropped;

@@ -1,4 +1,4 @@
-// What the nozzle makes of a run when the base is given.
+// Measures the nozzle's motion in a run whose base is given.
 //
 //   e   contour error, the distance from the nozzle to the path around the reference
 #pragma once
@@ -33,8 +33,8 @@ struct AxesModel : Axes<dynamics::FlexibleAxis> {
   double times_tolerance = 1.0;  // how many tolerances its nozzle may stray
 };
 
-// All that a tolerance is to hold for: the axes as given, and as they are at the edges of what they
-// may be.
+// All models for which a tolerance shall hold: the axes as given, and the axes at the edges of
+// their range.
 [[nodiscard]] std::vector<AxesModel> models_of(const compensate::Setup& setup);
 
 // How far the nozzle of an axis swings while the base rests there.
@@ -56,18 +56,18 @@ struct NozzleMeasure {
   // The nozzle's speed relative to F, and in travel the base's as well; at the edges of a band it
   // may be more.
   std::vector<double> speed;
-  // By how much the width of the line is off there with the first model's nozzle, relative to what
-  // it may.
+  // The error of the line's width around each node with the first model's nozzle, relative to its
+  // tolerance.
   std::vector<double> width;
-  // For each model, how far the nozzle swings in the end, relative to what it may: half the
-  // tolerance for the first one, since the next run begins with that swing, and all of it for the
-  // others.
+  // For each model, the nozzle's swing in the end relative to its allowance. The first model's
+  // allowance is half the tolerance, since the next run begins with this swing. The other models'
+  // allowance is the whole tolerance.
   std::vector<double> left;
 };
 
-// plan: what the base was found for, whose pieces have these bounds, beginning at starts_s[0],
-// which also has the end of the last one. nozzle: where the run begins; unset for a part that
-// begins in motion. extruder: unset if the width does not count.
+// plan: the plan that the base was found for. Its pieces have these bounds. starts_s: the start of
+// each piece, and the end of the last one. nozzle: its state where the run begins; unset for a part
+// that begins in motion. extruder: unset if the width does not count.
 [[nodiscard]] NozzleMeasure measure(std::span<const planner::PlannedMove> plan,
                                     std::span<const MoveBounds> bounds,
                                     std::span<const double> starts_s,

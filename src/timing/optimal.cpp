@@ -16,8 +16,8 @@ namespace {
 
 using Tuned = OptimalTunings;
 
-// Travel that wanders may come too near to what is laid next, and a first plan that is too quick
-// may lead nowhere. So others come after it.
+// First plans, in the order in which they are tried. Travel that wanders may come too near to the
+// filament laid next, and the search from a plan that is too quick may fail.
 constexpr FirstPlan kFirstPlans[] = {{0.5, kTravelTolerance_mm}, {0.5, 0.05}, {0.15, 0.05}};
 
 // The rules for the sections by the models of the axes. nullopt: sections do not know such models.

@@ -20,8 +20,8 @@ struct Pieces {
 [[nodiscard]] planner::PlannedMove part_of(const planner::PlannedMove& move, double from,
                                            double to);
 
-// Cuts short pieces off both ends of a long move, as the timing differs near vertices alone. They
-// take so long at the speed of the slower neighbour.
+// Cuts short pieces off both ends of a long move, as the timing differs near vertices alone.
+// ends_s: the time that these pieces take at the speed of the slower neighbour.
 [[nodiscard]] Pieces in_pieces(std::span<const planner::PlannedMove> path,
                                std::span<const MoveBounds> bounds, std::span<const double> ends_s);
 

@@ -76,7 +76,7 @@ class ScaledLimits {
   [[nodiscard]] Near largest_near(const std::vector<double>& of_nodes, const PlanNodes& nodes,
                                   double reach_s) const;
 
-  // The plan passes the vertex at this speed.
+  // Rescales the limit of a vertex that the plan passes at speed_mm_s.
   void rescale_vertex(std::size_t i, double speed_mm_s, double g, const Step& step);
   void rescale_piece(std::size_t i, const planner::PlannedMove& piece, const Errors& errors,
                      const Step& step);

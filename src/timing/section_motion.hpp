@@ -14,21 +14,22 @@ namespace unflex::timing {
 
 // Axes that the machine may have instead, whose frequencies are a little different.
 struct SectionEdge : Axes<dynamics::FlexibleAxis> {
-  XY off;  // ω relative to that of the axis as given, less 1
+  XY off;  // ω over the given axis' ω, minus 1
 };
 
-// What the motion is to keep.
+// Rules that the motion has to keep.
 struct SectionRules : Axes<dynamics::Mode> {
-  // Where the base may be.
+  // Limits of the base's place.
   Axes<compensate::BaseLimits> limits;
-  // Their nozzles may stray so many tolerances, but no more than travel.
+  // Axes at the edges of a band. Their nozzles may stray times_tolerance tolerances, but no more
+  // than travel may.
   std::vector<SectionEdge> edges;
   double times_tolerance = 2.0;
   double max_accel_mm_s2 = 0.0;  // of the base, per axis
-  bool shares_motors = false;    // of |ẍ ± ÿ| instead
+  bool shares_motors = false;    // the limit is of |ẍ ± ÿ| instead
 };
 
-// When the nozzle is where.
+// The time at which the nozzle passes a place on a leg.
 struct Passage {
   double time_s = 0.0;
   std::size_t leg = 0;

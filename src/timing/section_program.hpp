@@ -1,5 +1,5 @@
-// The quadratic program of one round of a section's search: its squares, its rows, and how well it
-// has foreseen the motion. section_search.hpp has the notation.
+// The quadratic program of one round of a section's search: its squares, its rows, and the accuracy
+// with which it has foreseen the motion. section_search.hpp has the notation.
 #pragma once
 
 #include <algorithm>
@@ -40,7 +40,7 @@ struct SectionState {
   return std::min(rules.times_tolerance * tolerance_mm, kTravelTolerance_mm);
 }
 
-// One u, and what is there.
+// One u, and the motion there.
 template <int D>
 struct SectionPlace {
   std::size_t k = 0;

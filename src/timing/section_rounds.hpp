@@ -20,10 +20,10 @@ class SectionRounds {
   // The largest of all periods, as shown.
   [[nodiscard]] const Excess& worst() const { return worst_; }
   [[nodiscard]] bool is_kept() const;
-  // Whether no round has come close to what is allowed yet, or the last one has gone far from it.
+  // Whether no round has come close to the limits yet, or the last round has gone far from them.
   [[nodiscard]] bool is_far() const;
-  // Whether the excess is the one of a round ago, so that it does not come right any more. The
-  // first round is round 0.
+  // Whether the excess has not changed since the round before, so that it does not come right any
+  // more. The first round is round 0.
   [[nodiscard]] bool is_stuck(int round) const;
 
   // Fits trust and factors to the result. surprise: how far each period's values are from those

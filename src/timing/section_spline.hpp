@@ -55,7 +55,7 @@ class SectionSpline {
     }
   }
 
-  // What makes the derivatives by u at an end of the D control points there.
+  // The matrix that turns the D control points at an end into the derivatives by u there.
   static Eigen::Matrix<double, D, D> end_matrix() {
     const Shares shares = spline_shares<D>(0.0);
     Eigen::Matrix<double, D, D> matrix;
@@ -83,7 +83,7 @@ class SectionSpline {
     return sum;
   }
 
-  // All there is to know at one u.
+  // The motion at one u.
   struct Place {
     TimeDerivatives<D> by_time;
     Axes<Values> flat;  // the flat outputs and their derivatives by time
@@ -120,14 +120,13 @@ class SectionSpline {
     }
     return sum;
   }
-  // What the factors make of the flat outputs.
+  // The sum over the flat outputs' derivatives, times these factors, for each axis.
   static XY apply(const Axes<Values>& factors, const Place& at) {
     return map_axes(sum_of_products, factors, at.flat);
   }
   [[nodiscard]] XY nozzle_mm(const Place& at) const { return origin_ + apply(flat_.nozzle, at); }
 
-  // scale n·(what the factors make of the flat outputs), and its gradient in the control points
-  // from number k on.
+  // scale n·apply(of, at), and its gradient in the control points from number k on.
   double linearise(const Place& at, const Shares& shares, const XY& n, const Axes<Values>& of,
                    double scale, Gradient& g) const {
     const Axes<Values> by_function =
@@ -160,8 +159,8 @@ class SectionSpline {
   }
 
  private:
-  // An end at rest, or in even motion, which the flat output follows as far behind as the nozzle is
-  // ahead of it.
+  // Sets an end at rest or in even motion. In even motion the flat output follows the nozzle at a
+  // constant distance.
   void set_end(std::size_t first, const Leg& leg, double along_mm, bool is_even) {
     const XY d = direction_of(leg);
     const XY start = start_of(leg);
@@ -176,8 +175,8 @@ class SectionSpline {
     }
   }
 
-  // One axis begins with a nozzle that swings on a base at rest. What a different frequency would
-  // make of it counts from there on.
+  // Sets the beginning of an axis whose nozzle swings on a base at rest. The effect of a different
+  // frequency counts from there on.
   void set_swing(std::size_t axis, const FlatOutput<D>& flat,
                  const dynamics::NozzleMotion& nozzle) {
     using Square = Eigen::Matrix<double, D, D>;

@@ -1,7 +1,7 @@
 // The path of a run as legs, and the sections of it that can be timed by themselves.
 //
-// Where the nozzle moves evenly at F for long, nothing is left to choose, and what comes before has
-// no say in what comes after. So a run is cut there, and where it rests.
+// Where the nozzle moves evenly at F for long, nothing is left to choose, and the motion before
+// does not affect the motion after. So a run is cut there, and where it rests.
 #pragma once
 
 #include <cstddef>
@@ -31,7 +31,8 @@ struct Leg {
   double to_mm = 0.0;
 };
 
-// How far along a line the place nearest to this one is, and how far away that is.
+// The place on a line that is nearest to place_mm: how far along the line it is, and how far from
+// place_mm.
 [[nodiscard]] inline double along_mm(const planner::PlannedMove& line, const XY& place_mm) {
   return foot_on(place_mm - xy_of(line.segment.start_mm), xy_of(line.direction), line.length_mm)
       .along_mm;
@@ -47,15 +48,15 @@ struct Leg {
 // Legs between two calm places.
 struct Section {
   std::vector<Leg> legs;
-  // Whether the nozzle moves evenly there; it rests otherwise.
+  // Whether the nozzle moves evenly at the beginning and at the end. Otherwise it rests there.
   bool starts_even = false;
   bool ends_even = false;
-  // How the nozzle swings at the beginning, if it does, while the base rests.
+  // The nozzle's swing at the beginning, if there is one, while the base rests.
   std::optional<dynamics::NozzleMotionXY> nozzle;
   // The nozzles of SectionRules::edges at the beginning. Empty: they are where they would be
   // without an earlier motion.
   std::vector<dynamics::NozzleXY> edge_nozzles;
-  // How far the nozzles at the edges may swing after it. Unset: another section follows.
+  // How far the nozzles at the edges may swing after the section. Unset: another section follows.
   std::optional<double> swing_tolerance_mm;
 };
 

@@ -9,7 +9,7 @@
 
 namespace unflex::timing {
 
-// When the nozzle has come how far along the path, in X and Y alone.
+// A time, and how far the nozzle has come along the path by then, in X and Y alone.
 struct Progress {
   double time_s = 0.0;
   double path_mm = 0.0;

@@ -123,7 +123,7 @@ class Watcher : public verify::Observer {
   [[nodiscard]] bool asks_for_unshaped() const override { return false; }
 };
 
-// Has `watcher` look while the band is printed on the rules' machine, and on these others.
+// Has `watcher` look while the band is printed on the rules' machine, and on further machines.
 Status watch(const Band& band, const verify::Rules& rules,
              const std::vector<verify::NozzleModel>& others, Watcher& watcher, Progress& progress) {
   std::istringstream sliced(band.sliced);

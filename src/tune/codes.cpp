@@ -62,7 +62,7 @@ Result<Codes> codes_of(const std::string& print, const std::string& name, Firmwa
     const std::string content(line.content());
     if (!in_layers && gcode::begins_layer(content)) {
       in_layers = true;
-      // What was laid before is the start code's.
+      // Filament laid before belongs to the start code.
       laid_mm = {};
       codes.start = before_first + behind;
       behind.clear();

@@ -15,10 +15,10 @@ namespace {
 
 constexpr double kSlow_mm_s = 20.0;
 constexpr double kFast_mm_s = 120.0;
-// Most hotends melt as much.
+// A flow that most hotends melt.
 constexpr double kFlow_mm3_s = 11.0;
 constexpr double kSlow_mm = 10.0;
-// Where the speed is even between its changes.
+// Length of even speed between two changes.
 constexpr double kEven_mm = 36.0;
 constexpr double kLongestRunUp_mm = 12.0;
 
@@ -43,7 +43,7 @@ PressureWall pressure_wall(const PressureTowerSettings& settings) {
 
 double followed_accel_mm_s2(const PressureTowerSettings& settings, double extruder_mm_s2) {
   constexpr double kSoon_s = 0.008;
-  // What counts while nothing is known. A larger advance shows in the first tower all the same.
+  // The advance to use while none is known. A larger advance shows in the first tower all the same.
   constexpr double kUnknown_s = 0.1;
   constexpr double kLeast_s = 1e-3;
   const PressureKnowledge& known = settings.trial.known;

@@ -12,17 +12,17 @@
 namespace unflex::tune {
 namespace {
 
-// What the first tower tries if nothing is known.
+// Values that the first tower tries if nothing is known.
 constexpr double kLeastSum_s = 0.012;
 constexpr double kMostSum_s = 1.0;
 constexpr std::size_t kMostBands = 41;
-// What the first tower for the dead time tries.
+// Values that the first tower for the dead time tries.
 constexpr double kLeastDeadTime_s = -0.002;
 constexpr double kMostDeadTime_s = 0.010;
 constexpr double kDeadTimeStep_s = 0.0005;
-// No band is made for less.
+// The least advance that a band is made for.
 constexpr double kLeastAdvance_s = 0.001;
-// Later towers look at least so far to either side.
+// The least reach of later towers to either side.
 constexpr double kLeastReach_s = 0.002;
 constexpr double kLeastReach = 0.03;  // share of s
 constexpr double kLeastDeadTimeReach_s = 0.0015;
@@ -126,7 +126,7 @@ Result<PressureKnowledge> read(const PressureTrial& trial, const Zone& zone) {
     known.dead_time_s = middle_s;
     known.dead_time_error_s = error_s;
   }
-  // At an end, the same is tried once more, around there.
+  // At an end of the bands, the next tower tries this value once more, around the zone.
   known.rounds += is_at_end && !is_broad(trial) ? 0 : 1;
   return known;
 }

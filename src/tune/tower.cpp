@@ -17,11 +17,11 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-// A wall is even for so long before its waves begin.
+// Length of even wall before its waves begin.
 constexpr double kLeadIn_mm = 3.0;
-// How many swings of the axis can be seen behind the waves.
+// Number of swings of the axis that can be seen behind the waves.
 constexpr double kSwingsSeen = 7.0;
-// A swing is so long on the wall that waves can be told apart.
+// Length of a swing on the wall, so that waves can be told apart.
 constexpr double kSwing_mm = 2.2;
 constexpr double kSlowest_mm_s = 50.0;
 constexpr double kFastest_mm_s = 160.0;

@@ -27,8 +27,8 @@ constexpr double kLiftSpeed_mm_s = 10.0;
 constexpr std::size_t kBaseLayers = 4;
 constexpr int kBrimLoops = 8;
 constexpr double kLeastSide_mm = 50.0;
-// The first layer of a band is drawn in by this, so that bands can be counted. Of every fifth, two
-// layers are.
+// The first layer of a band is drawn in by this, so that bands can be counted. Every fifth band has
+// two such layers.
 constexpr double kGroove_mm = 0.2;
 constexpr std::size_t kDeepGroove = 5;
 constexpr double kLiftAtEnd_mm = 10.0;
@@ -72,7 +72,7 @@ std::string codes_comments(const Codes& codes) {
   return text;
 }
 
-// What follows a mark at the begin of a line.
+// The text behind a mark at the begin of a line.
 std::optional<std::string_view> behind(std::string_view line, std::string_view mark) {
   return line.starts_with(mark) ? std::optional(line.substr(mark.size())) : std::nullopt;
 }

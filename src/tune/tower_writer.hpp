@@ -1,5 +1,5 @@
-// Writes what all towers have: a square of rounded corners, ring by ring, and what stands around
-// it.
+// Writes the parts that all towers share: a square with rounded corners, ring by ring, and the
+// codes around it.
 #pragma once
 
 #include <cstddef>
@@ -23,7 +23,7 @@ class TowerWriter {
   [[nodiscard]] double width() const { return 1.125 * printer_->nozzle_diameter_mm; }
   [[nodiscard]] double filament_per_mm() const { return e_per_mm_; }
   [[nodiscard]] double side_mm() const { return side_mm_; }
-  // What has been written since.
+  // The text written since the last take().
   [[nodiscard]] std::string take();
 
   void line(const std::string& text) { text_ += text + "\n"; }
@@ -32,15 +32,16 @@ class TowerWriter {
   // A point of a corner, which is a quarter of a circle: 2 bottom left, 3 bottom right, 4 or 0 top
   // right, 5 or 1 top left. share: 0 where the ring comes in, 1 where it leaves.
   [[nodiscard]] XY corner(int number, double inset_mm, double share) const;
-  // `distance_mm` along a wall that begins at `start`, and `inward_mm` off its line: 0 the bottom
-  // one, 1 the right one, ….
+  // A point `distance_mm` along a wall that begins at `start`, and `inward_mm` off its line. Wall 0
+  // is the bottom one, 1 the right one, ….
   [[nodiscard]] static XY on_wall(int wall, XY start, double distance_mm, double inward_mm);
 
-  // Extrudes a wall from where the nozzle is, at the end of the corner ahead of it, to the next.
+  // Extrudes a wall from the nozzle's place, at the end of the corner ahead of the wall, to the
+  // next corner.
   using WallOf = std::function<void(int wall, double inset_mm)>;
-  // One ring of the square, drawn in by inset_mm; its walls are even at this speed.
+  // One ring of the square, drawn in by inset_mm. Its walls are even at this speed.
   void ring(double inset_mm, double speed_mm_s);
-  // One ring with other walls; this is the speed of its corners.
+  // One ring with walls by `wall`. speed_mm_s is the speed of its corners.
   void ring(double inset_mm, double speed_mm_s, const WallOf& wall);
 
   struct Bands {
@@ -51,7 +52,7 @@ class TowerWriter {
     std::function<std::string(std::size_t band)> head = {};
     std::string after = {};
   };
-  // The whole tower. mark: what comments at its begin say it tries, in whole lines.
+  // The whole tower. mark: comments at the tower's begin that tell its trial, in whole lines.
   [[nodiscard]] Tower write(const std::string& mark, const Bands& bands);
 
  private:

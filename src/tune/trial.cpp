@@ -25,9 +25,9 @@ constexpr double kBroadStep = 1.04;
 constexpr double kBroadWave_hz = 70.0;
 constexpr double kBroadAccel_mm_s2 = 2500.0;
 
-// What an eye sees of waves in a wall, from trough to crest.
+// The height of waves in a wall that an eye sees, from trough to crest.
 constexpr double kSeen_um = 8.0;
-// So much of the print's acceleration is used for the waves. The rest keeps the speed even.
+// Share of the print's acceleration that the waves use. The rest keeps the speed even.
 constexpr double kShareOfAccel = 0.7;
 constexpr int kMostWaves = 8;
 // The zone shall be wider, by this factor, than the zone that the other value's error alone closes.
@@ -61,7 +61,7 @@ double half_zone_of(const Waves& waves, double damping_ratio) {
   return kSeen_um / (100.0 * um_per_percent(waves, damping_ratio));
 }
 
-// Waves for which an axis shows a zone of this half width, with as few as do it.
+// The fewest waves for which an axis shows a zone of this half width.
 Waves waves_for(const Knowledge& known, double half_zone, double accel_mm_s2) {
   Waves waves{known.freq_hz, kShareOfAccel * accel_mm_s2, 1};
   while (waves.count < kMostWaves && half_zone_of(waves, known.damping_ratio) > half_zone) {
@@ -169,13 +169,13 @@ Result<Knowledge> read(const Trial& trial, const Zone& zone) {
   const bool at_low_end = zone.first == 1;
   const bool at_high_end = zone.last == trial.bands;
   if (trial.parameter == Parameter::freq_hz) {
-    // What passes at the pole is |1 − (f/f_c)²|, which is the same at both edges.
+    // The part that passes at the pole is |1 − (f/f_c)²|, which is the same at both edges.
     known.freq_hz = std::sqrt(2.0 / (1.0 / (low * low) + 1.0 / (high * high)));
     const double half = 0.5 * math::log(high / low);
     const double step = math::log(trial.step);
     known.freq_error = std::max(0.5 * step, kUnevenEye * half);
     if (at_low_end || at_high_end) {
-      // The zone may go on. The same is tried once more, around here.
+      // The zone may go on beyond the bands. The next tower tries once more, around here.
       known.freq_error = std::max(known.freq_error, half + step);
       known.rounds = trial.known.rounds;
     }

@@ -1,7 +1,7 @@
-// Checks lines that ask for a temperature ahead of their place in the sliced file. No other line
-// may leave its place, and no other may be added but in the forms that unflex has for what it adds.
-// Such a line must not wait. It must pass no other command to the hotend, no change of the tool, no
-// pause and nothing that may be any of these. The next temperature that the sliced file asks for
+// Checks lines that ask for a temperature ahead of their place in the sliced file. All other lines
+// must keep their place. Lines may be added only in the forms that unflex adds. A line that asks
+// ahead must not wait. It must pass no other command to the hotend, no change of the tool, no
+// pause, and no line that may be any of these. The next temperature that the sliced file asks for
 // must be its own.
 #pragma once
 
@@ -20,16 +20,16 @@ class AheadCheck {
   AheadCheck(Firmware firmware, bool allowed) : firmware_(firmware), allowed_(allowed) {}
 
   // Whether a line of the output that the sliced file does not have here asks ahead. If so, the
-  // sliced file's own line is awaited.
+  // sliced file's own line is awaited from now on.
   [[nodiscard]] bool takes(const gcode::Line& output);
-  // Whether a line of the sliced file that the output does not have here is the one awaited.
+  // Whether a line of the sliced file that the output does not have here is the awaited one.
   [[nodiscard]] bool is_awaited(const gcode::Line& input) const;
   // The awaited line has come.
   void arrive() { awaited_.reset(); }
-  // Passes a line that both files have here. loses_place: it may move the machine or do anything.
-  // Returns what is wrong if the awaited line should have come before it.
+  // Passes a line that both files have here. loses_place: the line may move the machine or do
+  // anything. Returns an error text if the awaited line should have come before this line.
   [[nodiscard]] std::optional<std::string> pass(const gcode::Line& line, bool loses_place);
-  // Both files have ended. Returns what is wrong if a line is still awaited.
+  // Both files have ended. Returns an error text if a line is still awaited.
   [[nodiscard]] std::optional<std::string> end();
 
  private:

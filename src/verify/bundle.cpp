@@ -10,7 +10,7 @@
 namespace unflex::verify {
 namespace {
 
-// A state closer to even motion than this has come to it.
+// A state closer to even motion than this counts as even motion.
 constexpr double kRests_mm = 1e-7;
 
 }  // namespace

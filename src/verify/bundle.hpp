@@ -23,12 +23,12 @@ struct BundleSums {
 
 class Bundle {
  public:
-  // models: one or more. All are looked at in steps of the first one's length, or shorter ones if
-  // one of them swings faster.
+  // models: one or more. All nozzles are looked at in steps of the first model's length, or in
+  // shorter steps if one of them swings faster.
   explicit Bundle(std::vector<NozzleModel> models);
 
   [[nodiscard]] std::size_t count() const { return models_.size(); }
-  // Forgets all others, and what they are like.
+  // Forgets all nozzles but the first, and their models.
   void keep_first();
   [[nodiscard]] const NozzleModel& model(std::size_t number = 0) const { return models_[number]; }
   // The longest time between two looks.
@@ -41,28 +41,28 @@ class Bundle {
   [[nodiscard]] const std::vector<double>& states() const { return arrays_.states; }
   void set_states(const std::vector<double>& states) { arrays_.states = states; }
 
-  // Base and nozzles are moved by as much.
+  // Moves base and nozzles by the same way.
   void shift(const XY& by_mm);
-  // The base goes on, or stands still, for this time.
+  // Lets the base go on, or stand still, for this time.
   void settle(const dynamics::BaseXY& base, double duration_s);
   // Whether all nozzles go along with a base in even motion.
   [[nodiscard]] bool rest_on(const dynamics::BaseXY& base) const;
   void ride_on(const dynamics::BaseXY& base);
 
-  // So many steps of h seconds will follow.
+  // Announces `steps` steps of h seconds.
   void begin_steps(double steps, double h);
   // base: at the start of the step.
   void step(const dynamics::BaseXY& base);
 
-  // Measures c of all nozzles at the time of the last slide() of `near`, and between this look and
-  // the one before, h seconds ago. h is 0 if the two have nothing to do with each other.
+  // Measures c of all nozzles at the time of the last slide() of `near`, and since the look before,
+  // h seconds ago. h is 0 if the two looks are not connected.
   void look(const ReferencePath& path, NearPath& near, double h);
-  // Adds up what was since the look before. moves: the reference moves; lays: filament is laid.
+  // Adds up the figures since the look before. moves: the reference moves; lays: filament is laid.
   void count(bool moves, bool lays);
-  // The last look alone, without weight.
+  // Adds up the last look alone, without weight.
   void count_moment(bool lays);
-  // The mean of c² since the look before, and the largest that it has been since then, or just
-  // before where three looks show a top between them. count() may lower the latter.
+  // The mean of c² since the look before, and the largest c² since then. Where three looks show a
+  // top between them, the largest may be just before. count() may lower the largest.
   [[nodiscard]] double mean_mm2(std::size_t number = 0) const { return arrays_.mean_mm2[number]; }
   [[nodiscard]] double largest_mm2(std::size_t number = 0) const {
     return arrays_.largest_mm2[number];

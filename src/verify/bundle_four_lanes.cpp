@@ -3,7 +3,7 @@
 #include "bundle_kernels.hpp"
 
 UNFLEX_FOUR_LANES_BEGIN
-// After all that it needs.
+// Included after everything that it needs.
 #include "bundle_lanes.hpp"
 
 namespace unflex::verify {

@@ -186,9 +186,9 @@ class LaneBundle final : public BundleKernel {
     return {across_x, across_y, vx - direction_x * speed, vy - direction_y * speed, is_at_end};
   }
 
-  // Where the middle one of three looks is highest, the top of the parabola through them, and else
-  // zero. If looks are equally far apart, it is no more than 9/8 of the middle, and it counts for
-  // no more if they are not.
+  // The top of the parabola through three looks where the middle look is the highest, otherwise
+  // zero. If looks are equally far apart, the top is no more than 9/8 of the middle. This bound is
+  // kept if they are not.
   [[nodiscard]] static Lanes top(const Lanes& e0, const Lanes& e1, const Lanes& e2, double before_h,
                                  double h) {
     constexpr double kMost = 1.125;

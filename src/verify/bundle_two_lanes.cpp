@@ -1,7 +1,7 @@
 #include <cstddef>
 
 #include "bundle_kernels.hpp"
-// After all that it needs.
+// Included after everything that it needs.
 #include "bundle_lanes.hpp"
 
 namespace unflex::verify {

@@ -22,7 +22,7 @@ namespace unflex::verify {
 class FilamentLag {
  public:
   // Adds a step of h seconds, with the nozzle at this place of the path. flows: filament comes out
-  // now. It does, or the reference lays filament.
+  // now. At least one must hold: filament comes out, or the reference lays filament.
   void add(const ReferencePath& path, const PathPlace& nozzle, double laid_mm, bool flows,
            double h);
   [[nodiscard]] LagStats stats() const;

@@ -7,7 +7,8 @@
 namespace unflex::verify {
 namespace {
 
-// A difference that is larger by less counts as equal, so that an even one has its first line.
+// A difference that is larger by less than this counts as equal, so that an even difference has its
+// first line.
 constexpr double kRounding = 1e-9;
 // A sliced file that lays less filament than this in the window, 10 µm/s, is no measure.
 constexpr double kLeast_mm = 1e-4;
@@ -82,7 +83,7 @@ void FlowDifferenceGauge::append_rest(double duration_s, std::deque<Phase>& phas
   phases.push_back(rest);
 }
 
-// Takes what is known of both files.
+// Compares the phases that are known of both files.
 void FlowDifferenceGauge::compare() {
   while (!sliced_.empty() && !output_.empty()) {
     Phase& sliced = sliced_.front();
@@ -138,7 +139,7 @@ void FlowDifferenceGauge::add(Stretch stretch) {
   }
 }
 
-// Both marks go on; the rates are those at the mark in front.
+// Moves both marks on. The rates are those at the mark in front.
 void FlowDifferenceGauge::go_on(const Rate& sliced, const Rate& difference, double duration_s) {
   Stretch& back = window_.front();
   const Rate s{sliced.value - back.sliced.value, sliced.slope - back.sliced.slope};

@@ -35,12 +35,12 @@ class FlowDifferenceGauge {
   // A run begins with the first move of the output. The first one of the sliced file follows
   // lead_in_s later.
   void begin_run(double lead_in_s);
-  // The next move of either file, in any order between the two. What is known of only one of them
-  // is held, so neither should be far ahead.
+  // The next move of either file; the two files may come in any order. Moves that are known of one
+  // file only are held, so neither file should be far ahead.
   void play_sliced(const planner::PlannedMove& move);
   void play_output(const planner::PlannedMove& move);
-  // All moves of the run are known. If the output ends before the sliced file, it lays nothing for
-  // the rest of that.
+  // All moves of the run are known. If the output ends first, it lays nothing for the rest of the
+  // sliced file.
   void end_run();
 
   // Covers all runs so far; nullopt if no window was compared.

@@ -28,8 +28,8 @@ class FlowGauge {
 
   explicit FlowGauge(double filament_area_mm2);
 
-  // Only moves in X or Y that lay filament have a flow. All others, such as retractions, take their
-  // time without any.
+  // Only moves in X or Y that lay filament have a flow. All other moves, such as retractions, take
+  // time without a flow.
   void play(const planner::PlannedMove& move);
   void rest(double duration_s);
 

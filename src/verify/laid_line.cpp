@@ -21,7 +21,8 @@ std::size_t cells(double duration_s) {
   return static_cast<std::size_t>(std::lround(duration_s / kCell_s));
 }
 
-// Cells, as far as the firmware may smooth ahead: Klipper takes a smooth time of 0.2 s at most.
+// The number of cells that the firmware may smooth ahead: Klipper takes a smooth time of 0.2 s at
+// most.
 constexpr std::size_t kLatency = 200;
 
 double begin_of_bin_mm(std::size_t number) {
@@ -79,7 +80,7 @@ void LaidLine::begin_section(const ReferencePath& path) {
 void LaidLine::take_pieces(const ReferencePath& path) {
   for (; next_piece_ < path.end(); ++next_piece_) {
     if (next_piece_ < path.first()) {
-      // It has been dropped before the nozzle came near.
+      // The place was dropped before the nozzle came near.
       starts_.push_back({});
       end_line();
       continue;

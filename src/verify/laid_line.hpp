@@ -12,8 +12,8 @@
 //             as a whole
 //   w         width error of a bin: filament that comes out while s is in it, over what the sliced
 //             file asks there, minus one
-//   edge      |contour error| + |w|/2 · width of a line, mm: how far one edge of the line may be
-//   off
+//   edge      |contour error| + |w|/2 · width of a line, mm: how far one edge of the line may
+//             be off
 //
 // Retractions are left out, by moves of filament alone and by wipes: what they do to the pressure,
 // the next one undoes. Only where pressure is written into the filament, wipes count. E(t), V(t)
@@ -41,10 +41,10 @@ class LaidLine {
  public:
   explicit LaidLine(const LineModel& model);
 
-  // From now on. `hotend` is what the file is printed with; with an advance of 0 it is not known,
-  // and nothing is measured.
+  // Sets the hotend that the file is printed with from now on. With an advance of 0 the hotend is
+  // not known, and nothing is measured.
   void set(const dynamics::HotendPressure& hotend, const planner::FirmwareAdvance& advance);
-  // Tells the observer of each bin, as of this nozzle. Null: nobody.
+  // Tells the observer each bin under this nozzle's id. Null: nobody is told.
   void watch(Observer* observer, NozzleId nozzle) {
     observer_ = observer;
     nozzle_ = nozzle;

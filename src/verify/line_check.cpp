@@ -73,10 +73,10 @@ void LineCheck::compare(bool complete, double place_tolerance_mm) {
   }
 }
 
-// Lines of the forms unflex adds may stand in the sliced file as well. Such a line is the sliced
-// file's if it stands where that one does; otherwise it was added. A line that asks for a
-// temperature ahead may be the sliced file's next line in the same run, and is told from that one
-// by the filament: less has come out ahead.
+// Lines of the forms that unflex adds may stand in the sliced file as well. Such a line is the
+// sliced file's own if it stands in the same place; otherwise it was added. A line that asks for a
+// temperature ahead may equal the sliced file's next line in the run. The filament tells them
+// apart: less has come out at the line ahead.
 void LineCheck::compare(const PlacedLine& input, const PlacedLine& output) {
   const bool same = same_line(input.line, output.line);
   const bool placed = same && at_same_place(input, output);

@@ -9,9 +9,9 @@
 
 namespace unflex::verify {
 
-// Equal byte for byte, except for durations in M73 and comments, and for the line ending. A missing
-// line ending may have been added. One of Windows may have become the short one, as binary G-code
-// has it.
+// Whether the lines are equal byte for byte, except for durations in M73 and comments, and for the
+// line ending. A missing line ending may have been added. A line ending of Windows may have become
+// the short one, as binary G-code has it.
 [[nodiscard]] bool same_line(const gcode::Line& input, const gcode::Line& output);
 
 class LineCheck {
@@ -22,12 +22,13 @@ class LineCheck {
         violations_(&violations),
         ahead_(input.firmware(), may_ask_ahead) {}
 
-  // Compares and removes what both files have read of the current run. complete: both have read
-  // all of it, so that what is left over on one side is an error. In a compensated run a line may
-  // stand that far from its place.
+  // Compares and removes the lines of the current run that both files have read. complete: both
+  // have read all of it, so that a line left over on one side is an error. In a compensated run a
+  // line may stand up to place_tolerance_mm from its place.
   void compare(bool complete, double place_tolerance_mm);
 
-  // Passes a section that both files have here: what was asked for ahead must not pass all of them.
+  // Passes a section that both files have here. A line that was asked for ahead must not pass every
+  // section.
   void pass(const Section& input, const Section& output);
 
  private:

@@ -14,9 +14,9 @@ namespace {
 // Times closer together than this are the same; the time axis of a print of days resolves 1e-11 s.
 constexpr double kSameTime_s = 1e-10;
 
-// In a long cruise we look at this interval whether the nozzle has come to rest on the base.
+// The interval of looks in a long cruise whether the nozzle has come to rest on the base.
 constexpr double kLook_s = 1.0;
-// If it has, steps may be longer by this factor, since nothing but the place changes any more.
+// The factor by which steps may be longer at rest, since only the place still changes.
 constexpr double kSparser = 6.0;
 
 bool is_cruise(const BasePhase& phase) {
@@ -207,7 +207,7 @@ double Meter::next_reference_change() {
   return piece.end_s;
 }
 
-// Moves base and nozzles by h seconds. rides: the nozzles rest on the base, and stay so.
+// Moves base and nozzles by h seconds. rides: the nozzles rest on the base and stay at rest on it.
 void Meter::step(BasePhase& phase, double h, bool rides) {
   bundle_.step(phase.xy);
   advance(phase.xy, h);
@@ -301,7 +301,7 @@ Meter::Sample Meter::look(const ReferencePhase& reference, const dynamics::Nozzl
   return {squared(error_mm), (*path_)[bundle_.nearest()].move.segment.line};
 }
 
-// Filament is laid before the reference moves or after it has ended.
+// Looks while filament is laid before the reference moves, or after it has ended.
 Meter::Sample Meter::look_at_rest(const dynamics::NozzleMotionXY& nozzle, double since_s) {
   if (path_->first() == path_->end()) {
     return {};

@@ -77,7 +77,7 @@ class Meter {
 
   // Tells the observer of every step of each nozzle.
   void watch(Observer* observer, NozzleBase base);
-  // From now on there is the first nozzle alone.
+  // Keeps the first nozzle alone from now on.
   void drop_others();
   // How many others there are, and how far they stray.
   [[nodiscard]] std::size_t others() const { return bundle_.count() - 1; }
@@ -93,7 +93,7 @@ class Meter {
   void begin_section(ReferencePath& path, double unplayed_s = 0.0, double unplayed_mm = 0.0);
   // Moves the base. If it does not start where the base stands, base and nozzle are shifted there.
   void play(const planner::PlannedMove& move) { play(move, move); }
-  // A move whose filament comes out otherwise than it is pushed.
+  // Plays a move whose filament comes out otherwise than it is pushed.
   void play(const planner::PlannedMove& laid, const planner::PlannedMove& pushed);
   // Moves the base by a phase that begins where the base stands.
   void play(BasePhase phase);

@@ -20,7 +20,7 @@ class Nozzles {
 
   // From now on the observer is told that these nozzles hang on this base.
   void watch_as(NozzleBase base);
-  // Only main() goes on.
+  // Keeps only main().
   void drop_detuned() { main_.drop_others(); }
 
   [[nodiscard]] const Meter& main() const { return main_; }
@@ -40,7 +40,7 @@ class Nozzles {
   // Sets how the printer's own shaper changes the motion from now on.
   void shape(const planner::Shaping& shaping);
   void play(const planner::PlannedMove& move) { play(move, move); }
-  // A move whose filament comes out otherwise than it is pushed.
+  // Plays a move whose filament comes out otherwise than it is pushed.
   void play(const planner::PlannedMove& laid, const planner::PlannedMove& pushed);
   // Plays the end of the shaped motion and returns how long the base moves after the plan's end.
   // Only what comes before that end is measured.

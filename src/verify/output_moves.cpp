@@ -6,7 +6,7 @@
 namespace unflex::verify {
 namespace {
 
-// Less than this is what rounding leaves, and no line is laid with it.
+// A smaller amount is a remainder of rounding, and no line is laid with it.
 constexpr double kNothing_mm = 2e-5;
 
 }  // namespace

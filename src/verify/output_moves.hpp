@@ -1,8 +1,8 @@
 // The moves of the emitted file, with the filament that comes out of the nozzle meanwhile.
 //
 // Where pressure advance is written into a run, the extruder pushes other filament than the nozzle
-// lays. What is measured of filament in such a run is what comes out (PressedFilament), move by
-// move. Elsewhere the printer's own pressure advance is taken to make the two the same.
+// lays. In such a run the filament that comes out is measured (PressedFilament), move by move.
+// Elsewhere the printer's own pressure advance is taken to make the two the same.
 #pragma once
 
 #include "pressed_filament.hpp"

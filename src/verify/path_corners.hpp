@@ -1,4 +1,4 @@
-// The corners of the path that is measured against, on the clock of one who follows it.
+// The corners of the path that is measured against, on the clock of the nozzle that follows it.
 #pragma once
 
 #include <cstddef>
@@ -13,13 +13,13 @@ class PathCorners {
  public:
   explicit PathCorners(double reach_s) : gauge_(reach_s) {}
 
-  // Another path takes the place of the one so far.
+  // Replaces the path so far by another one.
   void begin(const ReferencePath& path);
   // The path's present section begins, and the clock jumps back by this time.
   void begin_section(const ReferencePath& path, double clock_back_s);
   // The clock jumps back by this time within a section.
   void set_clock_back(double time_s) { shift_s_ += time_s; }
-  // Takes what is known of the path in the sections that have begun.
+  // Takes the known pieces of the path in the sections that have begun.
   void follow(const ReferencePath& path);
   // The nozzle has moved for h seconds, which end at time_s.
   void pass(double time_s, const dynamics::NozzleMotionXY& from, const dynamics::NozzleMotionXY& to,

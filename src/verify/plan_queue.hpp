@@ -36,7 +36,7 @@ class PlanQueue {
   [[nodiscard]] planner::PlannedMove take();
   // Drops the finished moves of the current section.
   void skip();
-  // Drops what is left of the current section, all of whose moves must be finished.
+  // Drops the rest of the current section, all of whose moves must be finished.
   void next_section();
 
  private:

@@ -53,7 +53,7 @@ double PressedFilament::push(double duration_s, double pushed_mm) {
 }
 
 double PressedFilament::follow(double duration_s, double rate_mm_s) {
-  // So finely that P' hardly changes.
+  // The longest part of a stretch, so short that P' hardly changes in it.
   constexpr double kFine_s = 2e-4;
   const double parts =
       hotend_.shape == dynamics::PressureShape::linear ? 1.0 : std::ceil(duration_s / kFine_s);

@@ -20,7 +20,7 @@ class PressedFilament {
   PressedFilament() = default;
   explicit PressedFilament(const dynamics::HotendPressure& hotend);
 
-  // Another pressure from now on. What is pressed together stays so.
+  // Sets another pressure from now on. Filament that is already pressed together stays so.
   void set(const dynamics::HotendPressure& hotend);
   // The extruder pushes pushed_mm at even speed within duration_s. Returns the filament that comes
   // out meanwhile, in mm.
@@ -38,8 +38,8 @@ class PressedFilament {
 
   dynamics::HotendPressure hotend_;
   double flow_mm_s_ = 0.0;
-  // How the extruder has turned within the dead time, the oldest stretch first. They last δ
-  // together, since at the beginning a rest stands for the time before.
+  // The turns of the extruder within the dead time, the oldest stretch first. All stretches
+  // together last δ, since at the beginning a rest stands for the time before.
   std::deque<Stretch> on_the_way_;
 };
 

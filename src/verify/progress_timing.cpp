@@ -93,7 +93,7 @@ bool ProgressTiming::has_move(std::size_t number) {
   return true;
 }
 
-// Q there.
+// Q at the place.
 double ProgressTiming::filament_at(const Place& place) const {
   const Sliced& on = sliced_[place.move];
   const double share = on.length_mm > 0.0 ? place.along_mm / on.length_mm : 1.0;

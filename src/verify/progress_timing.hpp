@@ -1,14 +1,15 @@
-// The timing of a run that need not last as long as sliced, by how far the emitted file has come on
+// The timing of a run that need not last as long as sliced, by the progress of the emitted file on
 // the sliced path.
 //
 // Notation:
 //   s      place on the sliced path, as its length from the run's beginning on, mm
-//   Q(s)   filament that the sliced file lays up to there      F(t)   filament that the emitted
-//   file b(t)   base                                                       has laid at time t
+//   Q(s)   filament that the sliced file lays up to there
+//   F(t)   filament that the emitted file has laid at time t
+//   b(t)   base
 //
-// After each line of the emitted file s goes forward to where Q agrees with F. That may be a whole
-// stretch, where nothing is laid, or where filament is laid in coarse steps; in it s is the place
-// nearest to the base.
+// After each line of the emitted file s goes forward to where Q agrees with F. Q may agree on a
+// whole stretch, where nothing is laid, or where filament is laid in coarse steps. On such a
+// stretch s is the place nearest to the base.
 #pragma once
 
 #include <cstddef>
@@ -25,12 +26,11 @@ class ProgressTiming {
  public:
   using Moves = std::function<bool(planner::PlannedMove&)>;
 
-  // Both hand out the moves of the run at hand; false at its end.
+  // Both give the next move of the run at hand; false at its end.
   ProgressTiming(Moves sliced, Moves emitted)
       : sliced_source_(std::move(sliced)), emitted_source_(std::move(emitted)) {}
 
-  // A run begins. What is known of the last one is forgotten. rounding_mm: by how much F may be off
-  // in the end.
+  // Begins a run and forgets the last one. rounding_mm: by how much F may be off in the end.
   void begin(double rounding_mm);
   // The next sliced move, with its timing; false at the end of the run. What the emitted file never
   // reaches is passed as sliced.
@@ -45,7 +45,7 @@ class ProgressTiming {
     double filament_mm = 0.0;  // Q where it begins
     double begin_s = 0.0;      // when it is reached, once it is
   };
-  // A place on one of them.
+  // A place on a sliced move.
   struct Place {
     std::size_t move = 0;
     double along_mm = 0.0;

@@ -1,4 +1,4 @@
-// Compares the state two files leave the machine in.
+// Compares the states in which two files leave the machine.
 #pragma once
 
 #include <string>

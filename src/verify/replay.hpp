@@ -43,8 +43,8 @@ struct Section {
   // The section's line; runs have none.
   gcode::Line line;
   std::optional<Regime> regime;  // before the line; run: before its first move; end: the final one
-  // Pressure advance that the file has set when the section begins; of a run that was joined over
-  // barriers, when its last part begins. nullopt: as the printer's configuration has it.
+  // Pressure advance that the file has set when the section begins. For a run that was joined over
+  // barriers: when its last part begins. nullopt: as the printer's configuration has it.
   gcode::PressureAdvance advance;
   double dwell_s = 0.0;
   // barrier: for how long the machine stands still to switch its shaper or pressure advance.
@@ -54,8 +54,8 @@ struct Section {
   bool is_approach = false;
   // barrier: its form is one that unflex adds, so the sliced file may not have this barrier.
   bool may_be_added = false;
-  // run: announced as compensated, how long before its plan the base begins, and whether it need
-  // not last as long as that plan.
+  // run: whether it is announced as compensated, by how much its base begins before its plan, and
+  // whether it may last longer or shorter than that plan.
   bool compensated = false;
   double lead_in_s = 0.0;
   bool has_free_timing = false;

@@ -57,12 +57,13 @@ class BaseCheck {
   void add_planned(const planner::PlannedMove& move);
   void add(const planner::PlannedMove& move);
   void end_run();
-  // A move between runs, of which the step of speed counts where it meets one.
+  // A move between runs. Its step of speed counts where the move meets a run.
   void add_kept(const planner::PlannedMove& move);
 
-  // The most that a motor may accelerate by what the run's plan has asked so far.
+  // The limit of a motor's acceleration, by the acceleration that the run's plan has asked for so
+  // far.
   [[nodiscard]] double accel_limit_mm_s2() const;
-  // The largest of all runs.
+  // The largest limit of all runs.
   [[nodiscard]] double largest_accel_limit_mm_s2() const { return largest_accel_limit_; }
   [[nodiscard]] double max_velocity_mm_s() const { return max_velocity_; }
   [[nodiscard]] double max_accel_mm_s2() const { return max_accel_; }
@@ -93,8 +94,8 @@ class BaseCheck {
   Motors motors_;
   PerMotor last_velocity_{};      // mean over the last move
   PerMotor end_velocity_{};       // at the end of the last move
-  PerMotor joined_velocity_{};    // at the end of what the next run or kept move meets
-  bool is_beside_run_ = false;    // whether that is a run
+  PerMotor joined_velocity_{};    // at the end of the motion that the next run or kept move meets
+  bool is_beside_run_ = false;    // whether that motion is a run
   double last_duration_s_ = 0.0;  // duration of the last move; 0: at rest
   std::size_t last_line_ = 0;
   // Without what rounding may have added.

@@ -79,7 +79,7 @@ bool SectionPaths::next_resting(std::deque<planner::PlannedMove>& own, planner::
   return true;
 }
 
-// For progress_timing_, before the move is played.
+// Reads an output move for progress_timing_, before the move is played.
 bool SectionPaths::next_output_ahead(planner::PlannedMove& laid) {
   OutputMove move;
   if (!sources_.output(move)) {
@@ -134,8 +134,8 @@ void SectionPaths::pass_until(double emitted_s) {
   }
 }
 
-// When the last move ends that the emitted nozzle has passed, on another path of the section, whose
-// first piece is given.
+// The end time of the last move that the emitted nozzle has passed, on another path of the section.
+// `first`: the section's first piece on that path.
 double SectionPaths::end_of_passed_s(ReferencePath& path, std::size_t first) const {
   const std::size_t passed = run_at_.next - run_at_.first;
   while (path.end() - first < passed && !path.section_complete()) {

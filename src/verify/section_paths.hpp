@@ -64,7 +64,7 @@ class SectionPaths {
 
   // The next move of the emitted file; false at the section's end.
   bool next_output(OutputMove& move);
-  // The next move of sliced() or kept() that ends by then and has not been handed out.
+  // The next move of sliced() or kept() that ends by this time and has not been handed out.
   [[nodiscard]] std::optional<planner::PlannedMove> next_sliced(double until_s) {
     return next(sliced_, sliced_at_, until_s);
   }
@@ -75,7 +75,7 @@ class SectionPaths {
   // then: as far in its section as the emitted nozzle has in its own, or to the end of the last
   // move that the emitted nozzle has passed.
   [[nodiscard]] double sliced_until_s(double emitted_s);
-  // How far the nozzle of the kept moves has come by then.
+  // How far the nozzle of the kept moves has come by emitted_s.
   [[nodiscard]] double kept_until_s(double emitted_s);
   // Reads all moves of kept().
   void complete_kept();

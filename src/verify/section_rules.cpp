@@ -13,7 +13,7 @@ constexpr double kOneLine_per_s = 10.0;
 // Allowance for rounding to steps and for how far the nozzle strays.
 constexpr double kRounding_mm = 0.05;
 // Filament that a line in the tail may lay in any case. Where the timing is free, a nozzle that
-// turns round in the end may have passed all of the path while some way of its base is left.
+// turns round in the end may have passed all of the path before its base has made all of its way.
 constexpr double kLate_mm = 5e-4;
 constexpr double kLateInFreeTiming_mm = 2e-3;
 // Shorter lines do not tell how much filament is laid per path.

@@ -27,8 +27,8 @@ class SectionRules {
   void add_sliced(const planner::PlannedMove& move) { sliced_rate_.add(move); }
   // A move of the emitted run, after it has been played. late: the plan had ended when it began.
   void add(const planner::PlannedMove& move, Meter& meter, bool late, double filament_tolerance_mm);
-  // The whole run has been played: as emitted, and as if its sliced moves had been kept. Its motors
-  // may have accelerated that much.
+  // The whole run has been played: as emitted, and as if its sliced moves had been kept.
+  // base_max_accel_mm_s2: the acceleration that its motors may have had.
   void end(const LineRate& rate, const Meter& kept, const Meter& emitted,
            double base_max_accel_mm_s2);
 

@@ -13,7 +13,7 @@ dynamics::BaseSegment later(const dynamics::BaseSegment& base, double h) {
           base.velocity + base.acceleration * h, base.acceleration};
 }
 
-// So much filament, counted from the start of the move.
+// The motion of this much filament, counted from the start of the move.
 dynamics::BaseSegment along_filament(const planner::PlannedMove& move, double filament_mm,
                                      double distance_mm, const planner::Phase& phase) {
   const double per_mm = filament_mm != 0.0 ? filament_mm / move.length_mm : 0.0;

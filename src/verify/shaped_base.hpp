@@ -48,7 +48,7 @@ class ShapedBase {
   // lead_s() before the first move, so it lasts as long as the motion given so far. A phase ends
   // where the first move begins.
   void add(const planner::PlannedMove& move, std::vector<BasePhase>& shaped);
-  // The machine stands still. Appends what is left of the shaped motion: until the plan's end, and
+  // The machine stands still. Appends the rest of the shaped motion: until the plan's end, and
   // behind it.
   void finish(std::vector<BasePhase>& until_end, std::vector<BasePhase>& behind);
 

@@ -1,4 +1,4 @@
-// When the lines come that tell how long the print takes.
+// The times at which the lines come that tell how long the print takes.
 #pragma once
 
 #include <cstddef>
@@ -23,7 +23,7 @@ class TimeNotes {
   // A move of that line begins.
   void play(std::size_t line, double time_s);
 
-  // Those that moves have come behind.
+  // The lines behind which a move has come.
   [[nodiscard]] const std::vector<Placed>& placed() const { return placed_; }
 
  private:

@@ -1,4 +1,4 @@
-// One of the two files as it is printed: its sections and moves, and what is measured of each by
+// One of the two files as it is printed: its sections and moves, and the figures of each file by
 // itself.
 #pragma once
 
@@ -51,7 +51,7 @@ class Track {
   [[nodiscard]] const Section& section() const { return replay_.section(); }
 
   void begin_section();
-  // A move is played. What comes out of the nozzle meanwhile may differ from what the file pushes.
+  // Plays a move. The filament that comes out may differ from the filament that the file pushes.
   void play(const planner::PlannedMove& pushed, const planner::PlannedMove& laid);
   // Counts the stop for the section's line, a dwell or a switch of filters, and returns how long
   // the machine stands still for it.

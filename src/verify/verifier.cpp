@@ -201,8 +201,8 @@ void Verifier::begin_section(bool compensated) {
   }
 }
 
-// By how much the filament of a run of free timing may be off in the end: a firmware that lays it
-// in steps may owe some.
+// By how much the filament of a run of free timing may be off in the end. A firmware that lays
+// filament in steps may owe some.
 double Verifier::owed_filament_mm() const {
   constexpr double kOwedSteps = 1.5;
   return spec_of(rules_.fixed.firmware).motion.rounds_to_steps
@@ -219,7 +219,7 @@ void Verifier::play_run() {
   }
   if (compensated) {
     const gcode::ModalState& modal = output_.section().regime->modal;
-    // A macro may have switched on what nobody has told of.
+    // A macro may have switched on a shaper that nobody has told of.
     const gcode::InterpreterOptions& told = rules_.interpreter;
     const bool is_touched =
         any_axis(std::logical_and<>{}, modal.shaper_touched, told.shaper_unknown);
@@ -252,7 +252,7 @@ void Verifier::skip_added_barriers() {
   }
 }
 
-// The machine stands still where unflex switches its shaper.
+// Joins the run over a barrier. The machine stands still there, since unflex switches its shaper.
 void Verifier::join_over_barrier() {
   const double switching_s = output_.rest_of_following_s();
   emitted_.hold(switching_s);
@@ -269,7 +269,7 @@ void Verifier::shape_sliced() {
   const planner::Shaping shaping = planner::shaping(rules_.fixed, input_.shaper());
   if (shaping.acts() && !unshaped_) {
     unshaped_ = original_;
-    unshaped_->main().drop_line();  // nothing is told of it
+    unshaped_->main().drop_line();  // its line of plastic is not reported
     unshaped_->watch_as(NozzleBase::unshaped);
     if (observer_ == nullptr || !observer_->asks_for_unshaped()) {
       unshaped_->drop_detuned();
@@ -279,7 +279,7 @@ void Verifier::shape_sliced() {
   original_.shape(shaping);
 }
 
-// Where nothing else is known, the hotend is taken to be what the sliced file advances for.
+// If the settings give no pressure advance, the hotend is taken to need the sliced file's.
 dynamics::HotendPressure Verifier::hotend() const {
   dynamics::HotendPressure hotend = rules_.line.hotend;
   if (hotend.advance_s == 0.0) {
@@ -349,7 +349,7 @@ void Verifier::play_run_moves(bool compensated) {
       return;
     }
     join_over_barrier();
-    // So that what the next part is printed with is known.
+    // Reads on, so that the regime of the next part is known.
     static_cast<void>(output_.replay().has_move());
     set_pressure(emitted_, output_.section());
   }

@@ -1,5 +1,5 @@
-// What G-code comes packed in: gzip (RFC 1952) and Prusa's binary G-code. Bytes in, text out, and
-// the reverse, in pieces and with bounded memory; nothing here reads or writes a file.
+// Packings of G-code: gzip (RFC 1952) and Prusa's binary G-code. Bytes in, text out, and the
+// reverse, in pieces and with bounded memory. Nothing here reads or writes a file.
 #pragma once
 
 #include <memory>
@@ -34,7 +34,7 @@ class Unpacker {
   // complete. Errors are of kind input, have the file's name and tell where in the packed file they
   // are. Nothing more comes after an error.
   [[nodiscard]] virtual Result<std::string> pull() = 0;
-  // What a binary file says beside its G-code, complete at the end of its text; null for gzip.
+  // The metadata of a binary file, complete at the end of its text; null for gzip.
   [[nodiscard]] virtual const Metadata* metadata() const { return nullptr; }
 };
 
@@ -45,8 +45,8 @@ class Packer {
  public:
   virtual ~Packer() = default;
 
-  // Whether all of the text must go through survey() before the first push(), because what stands
-  // at the end of the text is packed at the front.
+  // Whether all of the text must go through survey() before the first push(), because the end of
+  // the text is packed at the front.
   [[nodiscard]] virtual bool wants_survey() const { return false; }
   [[nodiscard]] virtual Status survey(std::string_view /*text*/) { return {}; }
   // Takes the next piece of the text, which need not consist of whole lines. Returns the packed
@@ -71,8 +71,8 @@ struct BgcodeOptions {
 };
 
 // origin: metadata of the binary file from which the text was unpacked. The keys, their order and
-// all values that the text does not give are taken from there. nullptr: what slicers say in
-// comments is sorted into blocks as PrusaSlicer does. name: what errors call the result.
+// all values that the text does not give are taken from there. nullptr: slicers' comments are
+// sorted into blocks as PrusaSlicer does. name: the result's name in errors.
 [[nodiscard]] std::unique_ptr<Packer> make_bgcode_packer(std::string name, const Metadata* origin,
                                                          BgcodeOptions options = {});
 

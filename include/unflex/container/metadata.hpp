@@ -1,4 +1,4 @@
-// What a binary G-code file says beside its G-code.
+// The metadata of a binary G-code file, which stand beside its G-code.
 #pragma once
 
 #include <cstdint>

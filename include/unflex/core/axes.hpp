@@ -1,7 +1,7 @@
 // A value for each axis whose nozzle swings: X and Y.
 //
-// What is done for one axis is written once and applied to all of them, so that a further axis is a
-// further member here.
+// Code for one axis is written once and applied to all axes. A further axis would be a further
+// member here.
 #pragma once
 
 #include <cstddef>
@@ -25,7 +25,7 @@ struct Axes {
   friend bool operator==(const Axes&, const Axes&) = default;
 };
 
-// As G-code and people write them, and as keys do.
+// The axes' letters as G-code and people write them, and as keys do.
 inline constexpr Axes<std::string_view> kAxisLetters{"X", "Y"};
 inline constexpr Axes<std::string_view> kAxisKeys{"x", "y"};
 
@@ -35,7 +35,7 @@ template <typename T>
   return {value, value};
 }
 
-// f(v, …) for each axis in turn, where v is this axis' part of a value.
+// Calls f(v, …) for each axis in turn. v is the axis' part of a value.
 template <typename F, typename... Values>
 constexpr void for_each_axis(F&& f, Values&&... values) {
   f(std::forward<Values>(values).x...);

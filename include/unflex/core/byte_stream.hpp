@@ -1,4 +1,4 @@
-// Bytes that come, or are taken, when the other side is ready, as those of a pipe.
+// Streams of bytes whose other side may not be ready, such as pipes.
 #pragma once
 
 #include <chrono>
@@ -15,11 +15,11 @@ class ByteSource {
   ByteSource& operator=(const ByteSource&) = delete;
   virtual ~ByteSource() = default;
 
-  // Waits no longer than this until there is something to read, be it the end or an error. False if
-  // there is nothing yet.
+  // Waits until there is something to read, which may be the end or an error, but no longer than
+  // `most`. Returns false if there is nothing yet.
   [[nodiscard]] virtual bool wait(std::chrono::milliseconds most) = 0;
-  // Puts what can be read at `to`, at most `room` bytes, and returns how many: 0 at the end. Or the
-  // errno of what went wrong, which is EINTR or EAGAIN if it is worth another try.
+  // Reads at most `room` bytes to `to` and returns their number, which is 0 at the end. If reading
+  // fails, it returns the errno. EINTR and EAGAIN mean that another try is worth it.
   [[nodiscard]] virtual tl::expected<std::size_t, int> read(char* to, std::size_t room) = 0;
 };
 
@@ -30,9 +30,10 @@ class ByteSink {
   ByteSink& operator=(const ByteSink&) = delete;
   virtual ~ByteSink() = default;
 
-  // Waits no longer than this until something can be written, or an error is known.
+  // Waits until something can be written or an error is known, but no longer than `most`.
   [[nodiscard]] virtual bool wait(std::chrono::milliseconds most) = 0;
-  // Writes some of the bytes and returns how many, or the errno of what went wrong, as above.
+  // Writes some of the bytes and returns how many. If writing fails, it returns the errno. EINTR
+  // and EAGAIN mean that another try is worth it.
   [[nodiscard]] virtual tl::expected<std::size_t, int> write(std::string_view bytes) = 0;
 };
 

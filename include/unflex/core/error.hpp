@@ -9,7 +9,7 @@
 
 namespace unflex {
 
-// What went wrong, as far as the caller's next step depends on it.
+// Kinds of errors, as far as the caller's next step depends on them.
 enum class ErrorKind {
   usage,     // command line or configuration: exit code 1
   input,     // the G-code or another input file: exit code 2

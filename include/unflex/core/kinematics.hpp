@@ -27,7 +27,7 @@ enum class Kinematics {
 // "hybrid_corexy", "hybrid_corexy_inverted", "hybrid_corexz".
 [[nodiscard]] std::string_view to_string(Kinematics kinematics);
 
-// All kinematics, in the order above.
+// All kinematics, in the order of the enumeration.
 [[nodiscard]] std::span<const Kinematics> all_kinematics();
 
 // The linear map from axes to motors: 3 × 3, motors by axes, without unit.
@@ -52,7 +52,8 @@ class Motors {
   // Whether there is a motor that moves both X and Y.
   [[nodiscard]] bool shared_by_xy() const;
 
-  // What motor i does when the axes do x, y, z: travel, velocity or acceleration.
+  // The motion of motor i for the motion x, y, z of the axes. Both are travels, velocities or
+  // accelerations.
   [[nodiscard]] double of(std::size_t i, double x, double y, double z) const {
     return rows_[i][0] * x + rows_[i][1] * y + rows_[i][2] * z;
   }
@@ -64,9 +65,9 @@ class Motors {
   // Where the axes are when the motors are at q.
   [[nodiscard]] std::array<double, kCount> axes(const std::array<double, kCount>& q) const;
 
-  // The largest magnitude of what a motor of X or Y does when the axes do x, y, z.
+  // The largest magnitude of motion of any motor of X or Y, for the motion x, y, z of the axes.
   [[nodiscard]] double largest_of_xy(const Axes<double>& xy, double z = 0.0) const;
-  // The uncertainty of motor i if that of every axis is 1.
+  // The uncertainty of motor i if every axis has an uncertainty of 1.
   [[nodiscard]] double uncertainty(std::size_t i) const {
     return std::abs(rows_[i][0]) + std::abs(rows_[i][1]) + std::abs(rows_[i][2]);
   }

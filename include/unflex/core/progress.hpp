@@ -1,4 +1,4 @@
-// How long-running work says how far it is and hears that it should stop.
+// The way in which long-running work reports its progress and learns that it should stop.
 #pragma once
 
 #include <string_view>

@@ -1,4 +1,5 @@
-// Where a text lies: a file, or memory. It can be read from its beginning as often as is asked for.
+// The storage of a text: a file, or memory. The text can be read from its beginning any number of
+// times.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +12,8 @@
 
 namespace unflex {
 
-// Appends to `out` what shall stand in the place of `text`, which is whole lines. Only the text's
-// last line may lack its ending.
+// Appends the replacement of `text` to `out`. `text` consists of whole lines. Only the last line of
+// the stored text may lack its ending.
 using LineChange = std::function<void(std::string_view text, std::string& out)>;
 
 class TextStore {
@@ -29,7 +30,8 @@ class TextStore {
   // Hands the text to `change`, block by block in order, and writes what it makes of it over the
   // text. False if it cannot be read or written.
   [[nodiscard]] virtual bool rewrite(const LineChange& change) = 0;
-  // Its length. nullopt if that is not known, as of a file whose name is gone since it was opened.
+  // The text's length. nullopt if it is not known, as for a file whose name is gone since it was
+  // opened.
   [[nodiscard]] virtual std::optional<std::uint64_t> bytes() const = 0;
 };
 

@@ -18,7 +18,7 @@
 
 namespace unflex::flow {
 
-// What solves the windows.
+// The solver of the windows.
 enum class EngineChoice {
   automatic,  // banded, checked by Ipopt on a few windows
   banded,     // structure-exploiting interior point, in threads
@@ -33,7 +33,7 @@ struct Job {
   std::shared_ptr<ByteSource> input_stream = {};
   std::string input_head = {};  // first bytes of input_stream, read already
   std::shared_ptr<ByteSink> output_stream = {};
-  // What the two streams carry: text or gzip. `input` and `output` hold text.
+  // The packing of the two streams: text or gzip. `input` and `output` hold text.
   container::Kind input_stream_kind = container::Kind::text;
   container::Kind output_stream_kind = container::Kind::text;
   std::string output_name;
@@ -76,7 +76,7 @@ struct PrintCounts {
   std::size_t barrier_lines = 0;
 };
 
-// What was understood of a file.
+// The facts that an inspection finds in a file.
 struct Inspection {
   std::string dialect;  // "PrusaSlicer 2.5.0 …" from the file's first or last comments
   PrintCounts counts;

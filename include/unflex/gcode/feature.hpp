@@ -1,4 +1,4 @@
-// What slicers say in comments about the lines that follow: the kind of feature that they lay.
+// Slicers' comments about the lines that follow: the kind of feature that the lines lay.
 //
 //   ;TYPE:External perimeter    PrusaSlicer, SuperSlicer, OrcaSlicer, Cura, ideaMaker
 //   ; FEATURE: Outer wall       Bambu Studio        ; feature outer perimeter   Simplify3D

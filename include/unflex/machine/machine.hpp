@@ -49,7 +49,7 @@ struct MarlinJunctions {
   double minimum_speed_mm_s = 0.05;    // MINIMUM_PLANNER_SPEED
 };
 
-// How many steps the board and the drivers can make; 0 and "": no limit.
+// The steps that the board and the drivers can make. 0 and "": no limit.
 struct BoardSettings {
   double max_step_rate_hz = 0.0;        // of each motor
   double max_total_step_rate_hz = 0.0;  // of all motors together
@@ -72,7 +72,7 @@ struct InputShaperSettings {
 
 struct PrinterSettings {
   Firmware firmware = Firmware::klipper;
-  // Which variant of the firmware runs, if not its makers' own (docs/compatibility.md). "auto": as
+  // The variant of the firmware, if it is not its makers' own (docs/compatibility.md). "auto": as
   // recognised; "mainline": its makers' own, whatever was recognised.
   std::string variant = "auto";
   std::string version;             // as the firmware tells it; empty: not known
@@ -113,8 +113,8 @@ struct StepLimits {
   [[nodiscard]] bool is_any() const;
 };
 
-// What the firmware knows as M201, M203 and so on is named by what it limits; docs/configuration.md
-// says which key is which command.
+// Limits that the firmware sets by M201, M203 and so on are named by what they limit.
+// docs/configuration.md tells which key is which command.
 struct LimitSettings {
   double max_velocity_mm_s = 300.0;
   double max_accel_mm_s2 = 5000.0;
@@ -149,9 +149,9 @@ struct ExtruderSettings {
   std::optional<double> max_extrude_only_accel_mm_s2;    // unset: Klipper's formula
   std::optional<double> max_flow_mm3_s;                  // unset: not limited
   double instantaneous_corner_velocity_mm_s = 1.0;
-  // The printer's own, if the print does not set it: Klipper's [extruder], M572 of RepRapFirmware.
-  // Marlin's is PrinterSettings::linear_advance_s. In Klipper it decides how long a switch of the
-  // shaper takes.
+  // The printer's own pressure advance, if the print does not set it: Klipper's [extruder], M572 of
+  // RepRapFirmware. Marlin's is PrinterSettings::linear_advance_s. In Klipper pressure advance
+  // decides how long a switch of the shaper takes.
   double pressure_advance_s = 0.0;
   double pressure_advance_smooth_s = 0.04;
 
@@ -230,14 +230,14 @@ struct AxisDynamics {
   [[nodiscard]] std::string description() const;
 };
 
-// By what share the axes' frequencies and damping ratios may be off, either way.
+// The shares by which the axes' frequencies and damping ratios may be off, either way.
 struct DynamicsError {
   std::optional<double> freq;  // unset: Settings::freq_error()
   double damping = 0.0;
 };
 
-// What still rings once the axes are made up for: a second mode, which hangs behind the ones of
-// `dynamics`. The base is then shaped against it. 0 Hz: there is none.
+// A second mode that still rings once the axes are compensated. It hangs behind the modes of
+// `dynamics`. The base is then shaped against it. 0 Hz: there is no second mode.
 struct SecondSettings {
   Axes<double> freq_hz;
   Axes<double> damping_ratio{0.05, 0.05};
@@ -248,7 +248,7 @@ struct KinematicsSettings {
   Kinematics type = Kinematics::cartesian;
 };
 
-// What each motor can do.
+// Limits of each motor.
 struct BaseSettings {
   std::optional<double> max_velocity_mm_s;  // unset: 2 · limits.max_velocity_mm_s
   // Unset: 2 · Settings::most_of_motor() · limits.max_accel_mm_s2.
@@ -272,15 +272,17 @@ struct SolveSettings {
 
 inline constexpr std::string_view kAllFeatures = "all";
 
-// How a free timing is found (unflex/timing/timing.hpp).
+// The method that finds a free timing (unflex/timing/timing.hpp).
 inline constexpr std::string_view kScaled = "scaled";
 inline constexpr std::string_view kOptimal = "optimal";
 
-// As fast as a tolerance of the nozzle allows, instead of as sliced (docs/timing.md).
+// Timing that is as fast as a tolerance of the nozzle allows, instead of as sliced
+// (docs/timing.md).
 struct TimingSettings {
   double tolerance_um = 0.0;    // 0: the timing stays as sliced
   std::string method{kScaled};  // or kOptimal
-  // Share of a line's width by which it may be off, where pressure is written; 0: it may be any.
+  // The width of a line may be off by this share of itself, where pressure is written. 0: the width
+  // may be any.
   double width_tolerance = 0.1;
   std::optional<double> max_speed_mm_s;           // of travel; unset: the slicer's F
   bool keep_accel_limits = false;                 // those of the plan as sliced
@@ -312,14 +314,14 @@ struct EmitSettings {
   bool checkpoints = false;
 };
 
-// The share that the base may use of the largest change of speed from line to line. The rest lets
-// the lines make up for each other.
+// The base may use this share of the largest change of speed from line to line. The lines use the
+// rest to make up for each other.
 inline constexpr double kSpeedStepShare = 0.93;
 // The firmware's own acceleration in a run over the base's, at least.
 inline constexpr double kEmitAccelFactor = 5.0;
 
-// The firmware's clock differs a little from line to line. With this room no more lines than the
-// budget begin within any 100 ms all the same.
+// The firmware's clock differs a little from line to line. This room keeps the lines that begin
+// within any 100 ms within the budget all the same.
 inline constexpr double kClockRoom = 1.002;
 
 struct VerifySettings {
@@ -327,7 +329,7 @@ struct VerifySettings {
   double hold_s = 0.5;
 };
 
-// Where a key came from that no source gives.
+// The origin of a key that no source gives.
 inline constexpr std::string_view kDefaultOrigin = "default";
 
 struct Settings {
@@ -348,26 +350,26 @@ struct Settings {
   // Where each key in force came from ("limits.max_accel_mm_s2" → "printer.toml:7", "--set",
   // "default"), one entry for every known key, in the order of the documentation.
   std::vector<std::pair<std::string, std::string>> origins;
-  // What the user should know about what was read.
+  // Remarks for the user about the settings that were read.
   std::vector<Diagnostic> notes;
-  // What no source says and a default stands for, though it decides over the result: resonances, or
-  // the firmware of a print that was sliced for another one than the default. The program refuses
-  // to compensate by a guess, and tells of it where it measures by one.
+  // Facts that decide over the result, but that no source gives, so that a default stands for them:
+  // resonances, or the firmware of a print that was sliced for another one than the default. The
+  // program refuses to compensate by a guess, and tells of it where it measures by one.
   std::vector<Diagnostic> guesses;
   // Why no print is compensated for this printer, and the way out (docs/compatibility.md).
   std::optional<Diagnostic> refusal;
 
   // Whether the timing is chosen by a tolerance, and not as sliced.
   [[nodiscard]] bool is_timing_free() const { return timing.tolerance_um > 0.0; }
-  // How far the nozzle may stray wherever it is allowed most; 0: the timing is as sliced.
+  // The largest tolerance that holds for the nozzle anywhere. 0: the timing is as sliced.
   [[nodiscard]] double largest_tolerance_um() const;
 
-  // Whether values that were set in code are what a printer file may hold: each in its range, and
-  // all in keeping with each other. An error of kind usage that names the keys. load() has checked
-  // it.
+  // Checks values that were set in code as if a printer file held them: each must be in its range,
+  // and all must fit each other. Errors are of kind usage and name the keys. Settings from load()
+  // are checked already.
   [[nodiscard]] Status validate() const;
 
-  // What is special about the firmware (core/firmware_spec.hpp).
+  // The firmware's peculiarities (core/firmware_spec.hpp).
   [[nodiscard]] const FirmwareSpec& spec() const;
 
   // The values behind unset options, by the firmware's own formulas and defaults.
@@ -404,26 +406,27 @@ struct Settings {
   // The most that the plan may ask of a motor of X and Y, relative to the limits. Klipper limits
   // what the tool does, the other firmwares what the motors do.
   [[nodiscard]] double most_of_motor() const;
-  // What such a motor may do by the printer's own limits, and the key that sets its acceleration.
+  // The limits of a motor of X and Y by the printer's own limits, and the key that sets the
+  // acceleration.
   [[nodiscard]] double motor_max_velocity_mm_s() const;
   [[nodiscard]] double motor_max_accel_mm_s2() const;
   [[nodiscard]] std::string_view motor_max_accel_key() const;
   [[nodiscard]] double base_max_velocity_mm_s() const;
-  // What a motor may do in a run whose plan accelerates X or Y by up to `asked_mm_s2`. A print may
-  // set more than the printer's own limit.
+  // The acceleration that a motor may have in a run whose plan accelerates X or Y by up to
+  // `asked_mm_s2`. A print may set more than the printer's own limit.
   [[nodiscard]] double base_max_accel_mm_s2(double asked_mm_s2) const;
   [[nodiscard]] double base_max_accel_mm_s2() const { return base_max_accel_mm_s2(0.0); }
   // base_max_accel_mm_s2() over what the plan asks; 0: it does not follow the plan.
   [[nodiscard]] double base_accel_times_asked() const;
   [[nodiscard]] double tail_s() const;
-  // By what share the frequencies may be off. A band of 10 % costs little where they are right, and
-  // at 5 % off it is better than a band of 5 % (docs/theory.md).
+  // The share by which the frequencies may be off. A band of 10 % costs little where they are
+  // right, and at 5 % off it is better than a band of 5 % (docs/theory.md).
   [[nodiscard]] double freq_error() const;
   // Whether the base is to suit more models than the axes as given.
   [[nodiscard]] bool has_several_models() const;
   [[nodiscard]] double along_weight() const;
   [[nodiscard]] double jerk_weight() const;
-  // jerk_weight() as it is where along_weight() is 1.
+  // The value of jerk_weight() if along_weight() is 1.
   [[nodiscard]] double tracking_jerk_weight() const;
   // The shorter AxisDynamics::good_period_ms() of both axes.
   [[nodiscard]] double good_period_ms() const;
@@ -439,7 +442,7 @@ struct Settings {
   [[nodiscard]] Axes<double> shaper_damping_ratio() const;
 };
 
-// Where settings come from.
+// The sources of settings.
 struct Sources {
   const PrintText* print = nullptr;         // the print they are for, if it is at hand
   std::optional<std::string> printer_file;  // --printer

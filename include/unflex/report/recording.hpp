@@ -1,5 +1,5 @@
-// What a page shows of a print besides its figures: the paths with their deviations, the worst
-// places, and how input shapers would have done. Its size is bounded, whatever the print.
+// Data for a print's page besides its figures: the paths with their deviations, the worst places,
+// and the results of input shapers. Its size is bounded, whatever the print.
 //
 //   before, after   the sliced file as the printer plays it, and the compensated one
 #pragma once
@@ -46,7 +46,7 @@ struct LayerPaths {
   std::size_t layer_step = 1;  // only every n-th layer is stored
   // The print's rectangle: nearly all of the paths' length lies inside.
   Axes<double> min_mm, max_mm;
-  double tolerance_mm = 0.0;  // left-out points lie at most so far from what is drawn
+  double tolerance_mm = 0.0;  // the largest distance of a left-out point from what is drawn
 };
 
 // Logarithmic, 15 steps to the double: code c stands for 0.05 µm · 2^(c/15); 0 for all below.
@@ -75,15 +75,15 @@ struct Place {
   std::vector<Moment> before, after;
 };
 
-// Time during which the contour error is between this cell's border and that of the next one.
+// Time during which the contour error is between this cell's border and the next cell's.
 struct HistogramCell {
   double from_mm = 0.0;
   double before_s = 0.0;
   double after_s = 0.0;
 };
 
-// How one method (none, unflex, an input shaper) would have done if the true frequencies were
-// others than those of the settings.
+// How well one method (none, unflex, an input shaper) would do if the true frequencies differed
+// from those of the settings.
 struct Contender {
   std::string name;
   std::vector<Spread> spreads;  // one for each of Recording::frequency_errors, or none
@@ -96,8 +96,8 @@ struct Contender {
 
 struct Recording {
   std::vector<LayerRow> layers;
-  // So many of them come before the first layer that the slicer names: lines that prime the nozzle.
-  // 0 if it names none.
+  // The number of layers before the first one that the slicer names. They are lines that prime the
+  // nozzle. 0 if the slicer names none.
   std::size_t start_layers = 0;
   LayerPaths paths;
   std::vector<FeatureRow> features;

@@ -1,4 +1,4 @@
-// What a run of the program has to tell, as plain data, and its JSON.
+// The result of a run of the program, as plain data, and its JSON.
 #pragma once
 
 #include <cstddef>
@@ -16,7 +16,7 @@
 namespace unflex::report {
 
 // Contour error of the nominal axes while extruding, before lines are made of the base. It shows
-// what it costs that the base suits a band of frequencies.
+// the cost of a base that suits a band of frequencies.
 struct Robustness {
   double rms_mm = 0.0;
   double nominal_rms_mm = 0.0;  // on the base optimised for the nominal axes alone
@@ -43,18 +43,18 @@ struct Fallback {
   std::string reason;
 };
 
-// What frequencies that are known better would gain where the timing is free.
+// The gain from frequencies that are known better, where the timing is free.
 struct NarrowerBand {
   double freq_error = 0.0;  // their band
   double saves_s = 0.0;     // of print time, as far as a sample of runs tells
 };
 
-// What became of the timing, where it is chosen by a tolerance of the nozzle.
+// The result of the timing, where a tolerance of the nozzle chooses it.
 struct FreeTiming {
   double tolerance_mm = 0.0;         // 0: the timing is as sliced
   std::size_t pieces_as_sliced = 0;  // runs, or parts of long ones, that keep their timing
   std::vector<Fallback> as_sliced;   // at most 1000 of them
-  std::size_t pieces_scaled = 0;     // whose timing is scaled, where the optimal one is asked for
+  std::size_t pieces_scaled = 0;     // with a scaled timing, although the optimal one is asked for
   std::vector<Fallback> scaled;      // at most 1000 of them
   std::optional<NarrowerBand> narrower;
 };
@@ -99,7 +99,7 @@ struct StepRates {
   };
   std::vector<Row> motors;  // those whose steps per mm are known
   Row total;                // of all of them together, without a name
-  // What is allowed; infinity: not limited.
+  // The allowed rate; infinity: not limited.
   double max_hz = std::numeric_limits<double>::infinity();
   double max_total_hz = std::numeric_limits<double>::infinity();
   double max_shared_hz = std::numeric_limits<double>::infinity();  // while more than one moves
@@ -110,7 +110,7 @@ struct LineBudget {
   std::size_t places_above = 0;
   std::vector<AboveBudget> above;  // at most 1000 are listed
   // Distance of the nozzle, across the path, from its place if the base moved exactly as optimised,
-  // while filament is laid. It shows what few lines and the printer's grid cost.
+  // while filament is laid. It shows the cost of few lines and of the printer's grid.
   double cost_rms_mm = 0.0;
   double cost_max_mm = 0.0;
 };
@@ -128,7 +128,7 @@ struct Setting {
   std::string origin;
 };
 
-// What the result was computed for, and what it is compared with.
+// Facts about the printer that the result was computed for and is compared with.
 struct PrinterFacts {
   struct Axis {
     std::string name;    // "X"
@@ -139,7 +139,7 @@ struct PrinterFacts {
   // The printer's own input shaper: "MZV 45 Hz"; empty if its configuration has none.
   std::string shaper;
   bool shaper_unknown = false;  // it may have one that no source tells of
-  // What a motor of X or Y may do by the printer's own limits, and where the second is from.
+  // The printer's own limits of a motor of X or Y, and the origin of the second limit.
   double motor_max_velocity_mm_s = 0.0;
   double motor_max_accel_mm_s2 = 0.0;
   std::string motor_max_accel_origin;
@@ -148,7 +148,7 @@ struct PrinterFacts {
   double max_lines_per_s = 0.0;
 };
 
-// What became of stretches between stops that could be compensated.
+// Results of the stretches between stops that could be compensated.
 struct Runs {
   std::size_t total = 0;
   std::size_t compensated = 0;
@@ -165,8 +165,8 @@ struct Solver {
   SolverCheck check;
 };
 
-// What became of the print's filament, where it was fitted to one that is not a full cylinder
-// before all else.
+// Results of fitting the print to a filament that is not a full cylinder. The fit comes before all
+// other work.
 struct FittedFilament {
   double sliced_mm = 0.0;  // of moves that print
   double fitted_mm = 0.0;
@@ -176,7 +176,7 @@ struct FittedFilament {
   double end_mm = 0.0;  // where the print ends on the filament
 };
 
-// What the work has cost this process and its children.
+// The cost of the work to this process and its children.
 struct Performance {
   double wall_s = 0.0;
   double cpu_s = 0.0;
@@ -209,8 +209,8 @@ struct Report {
   LineBudget line_budget;
   Solver solver;
 
-  // What to type behind SET_INPUT_SHAPER after the print, since the output leaves a shaper off that
-  // nobody has told of: "SHAPER_FREQ_X=..."; empty if there is nothing to type.
+  // Words to type behind SET_INPUT_SHAPER after the print: "SHAPER_FREQ_X=...". The output leaves a
+  // shaper off whose settings nobody has given. Empty if there is nothing to type.
   std::string shaper_left_off;
 
   std::optional<FittedFilament> fitted_filament;

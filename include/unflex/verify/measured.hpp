@@ -29,7 +29,7 @@ struct Deviation {
   DeviationStats all;
 };
 
-// How far the nozzle passes from the corners of the path. Every corner counts as much as any other.
+// How far the nozzle passes from the corners of the path. All corners have the same weight.
 struct CornerStats {
   std::size_t count = 0;
   double rms_mm = 0.0;
@@ -59,8 +59,8 @@ struct EdgeStats {
   std::size_t line = 0;
 };
 
-// How much more filament comes out at one end of the lines than is sliced there, relative to it:
-// each line of at least 3 mm counts once.
+// The excess of filament at one end of the lines over the sliced amount, relative to it. Each line
+// of at least 3 mm counts once.
 struct EndStats {
   double rms = 0.0;
   double mean = 0.0;
@@ -98,9 +98,9 @@ struct LagStats {
   std::size_t max_line = 0;
 };
 
-// Volume of filament per second in moves of X and Y, as a mean over 20 ms, and how fast it changes:
-// by how much it is another one 20 ms later, divided by that time. The lines are those of the file
-// that is measured: the one that is played at the end of the mean, and the one in the middle of the
+// Volume of filament per second in moves of X and Y, as a mean over 20 ms, and its rate of change:
+// the change of the mean within 20 ms, divided by that time. The lines are those of the file that
+// is measured: the one that is played at the end of the mean, and the one in the middle of the
 // change.
 struct FlowStats {
   double max_mm3_s = 0.0;
@@ -120,7 +120,7 @@ struct FlowDifference {
 
 // The nozzle's speed while it lays filament, relative to the F of the nearest part of the path.
 struct FeedStats {
-  double p999 = 0.0;  // it is below for 99.9 % of the time
+  double p999 = 0.0;  // the ratio is below this for 99.9 % of the time
   double max = 0.0;
   std::size_t max_line = 0;
 };
@@ -141,7 +141,7 @@ struct BaseStats {
   // Largest change of mean velocity between neighbouring moves, divided by the time between their
   // middles.
   double max_accel_mm_s2 = 0.0;
-  double max_step_mm_s = 0.0;  // that change itself, which a motor takes at once
+  double max_step_mm_s = 0.0;  // the change of mean velocity, which a motor takes at once
   // The largest acceleration that a run's motors were allowed; 0 without such runs.
   double accel_limit_mm_s2 = 0.0;
 };
@@ -169,8 +169,8 @@ struct Measured {
   std::optional<FlowDifference> flow_difference;
   BaseStats base;
   OutputStats output;
-  // Largest filament error of one move or one run of the input. What the output's lines cannot
-  // resolve in time is no error.
+  // Largest filament error of one move or one run of the input. An error that the output's lines
+  // cannot resolve in time does not count.
   double worst_move_extrusion_error_mm = 0.0;
   // Longest lag or lead of the nozzle against the plan of its run, averaged over 0.1 s.
   double worst_run_drift_s = 0.0;

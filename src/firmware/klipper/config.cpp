@@ -176,8 +176,9 @@ Status add_saved(std::string_view text, std::size_t first_line, const std::strin
   return status;
 }
 
-// Kalico: "${constants.belt}" stands for the option belt of [constants]; other sections do as well
-// (klippy/configfile.py). What refers to something that is not there stays and brings a note.
+// Kalico: "${constants.belt}" stands for the option belt of [constants]. Other sections can be
+// named as well (klippy/configfile.py). A reference to something that is not there stays and brings
+// a note.
 constexpr std::string_view kReference = "${";
 constexpr int kMostReferences = 100;  // of one option, since they may go in a circle
 

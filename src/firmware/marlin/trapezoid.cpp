@@ -26,7 +26,8 @@ struct Ramp {
     ++steps;
     duration_s += 1.0 / rate_steps_s;
   }
-  // The rate at one end of an even ramp of these steps and that time which has the other end's.
+  // An even ramp of these steps and this duration has rate_steps_s at one end. Gives the rate at
+  // its other end.
   [[nodiscard]] double other_end(double rate_steps_s) const {
     return std::max(2.0 * steps / duration_s - rate_steps_s, 0.0);
   }

@@ -8,7 +8,7 @@ namespace unflex::machine {
 namespace {
 
 // Losses follow a power law. The linear model has the same loss at this temperature above the
-// ambient one, which is as prints have it.
+// ambient one, which is usual in prints.
 constexpr double kWorking_c = 185.0;
 
 }  // namespace

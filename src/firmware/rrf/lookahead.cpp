@@ -42,8 +42,8 @@ void limit_jerk(const Settings& settings, const Dda& next, Dda& dda) {
   }
 }
 
-// One joint of the way back: decides at which speed moves[i] can end. True if for this the move
-// before it must end faster too. The target of the move before is then set.
+// One joint of the way back: decides at which speed moves[i] can end. True if the move before must
+// end faster for this. The target of that move is then set.
 bool look_back(const Settings& settings, std::deque<Dda>& moves, std::size_t i,
                bool frozen_extrudes) {
   Dda& dda = moves[i];

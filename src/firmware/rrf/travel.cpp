@@ -83,8 +83,8 @@ void RrfTravel::read(std::string_view arguments, const SourcePlace& place, Readi
   }
 }
 
-// If one end is outdated, its place is taken. It is before the place of the note on that end, so
-// the note is still told (load.cpp, is_known).
+// If one end is outdated, the key gets that end's place. It is before the place of the note on that
+// end, so the note is still told (load.cpp, is_known).
 void RrfTravel::add_to(Reading& reading) const {
   for (std::size_t axis = 0; axis < axes_.size(); ++axis) {
     const auto& [min, max] = axes_[axis];

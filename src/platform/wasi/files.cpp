@@ -69,7 +69,7 @@ class FileBuffer final : public std::streambuf {
   }
 
  private:
-  // The file is further on than the reader, by what it has not taken yet.
+  // The file's place is ahead of the reader's by the bytes that the reader has not taken yet.
   void forget_read() {
     if (gptr() != egptr()) {
       std::fseek(file_, static_cast<long>(gptr() - egptr()), SEEK_CUR);
@@ -134,7 +134,7 @@ bool is_directory(const std::string& name) {
   return ::stat(name.c_str(), &status) == 0 && S_ISDIR(status.st_mode);
 }
 
-// Patterns in the last part of a name alone.
+// Only the last part of a name may be a pattern.
 std::vector<std::string> matching_files(const std::string& pattern) {
   if (pattern.find_first_of("*?[") == std::string::npos) {
     return exists(pattern) ? std::vector{pattern} : std::vector<std::string>{};
@@ -153,8 +153,8 @@ std::vector<std::string> matching_files(const std::string& pattern) {
   return files;
 }
 
-// A name that counts from where one is stays so, since nobody knows where that is. Links are
-// followed in the last part of a name alone.
+// A name that counts from the current folder stays so, since that folder is not known. Only links
+// in the last part of a name are followed.
 std::string canonical_name(const std::string& name) {
   std::string at = name;
   std::array<char, 4096> target{};

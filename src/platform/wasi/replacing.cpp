@@ -25,7 +25,7 @@ tl::expected<FileDescriptor, int> claim_folder(const std::string& folder, Claim 
   return claimed;
 }
 
-// The host tells when it is written.
+// The host tells only when the file is written.
 int check_writable(const std::string& /*name*/) { return 0; }
 
 int take_over_permissions(int /*descriptor*/, const std::string& /*replaced*/) { return 0; }

@@ -12,8 +12,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What stands in square brackets, up to behind the closing one: whether it names the character.
-// Without a closing bracket the opening one stands for itself.
+// Whether the set in square brackets at the pattern's beginning has the character. Moves the
+// pattern up to behind the closing bracket. Without a closing bracket the opening one stands for
+// itself.
 bool matches_set(std::string_view& pattern, char character) {
   const std::size_t end = pattern.find(']', 2);
   if (end == std::string_view::npos) {

@@ -17,7 +17,8 @@ namespace fs = std::filesystem;
 
 std::uint64_t joined_halves(DWORD high, DWORD low) { return (std::uint64_t{high} << 32U) | low; }
 
-// The state of what a handle leads to. What is no file on a disk is a device or a pipe.
+// The state of the object behind a handle. An object that is no file on a disk is a device or a
+// pipe.
 tl::expected<FileState, int> state_of_handle(HANDLE handle) {
   if (GetFileType(handle) != FILE_TYPE_DISK) {
     return FileState{};

@@ -37,7 +37,7 @@ void prepare_process() {
   }
 }
 
-// What main() gets is in the system's old code page.
+// main() gets the arguments in the system's old code page.
 std::vector<std::string> arguments_of(int /*count*/, char** /*arguments*/) {
   std::vector<std::string> words;
   int count = 0;

@@ -147,7 +147,7 @@ std::string name_of_descriptor(int descriptor) {
   return name_of(name);
 }
 
-// No name does here.
+// No name leads to a descriptor here.
 bool leads_to_descriptor(const std::string& /*name*/) { return false; }
 
 }  // namespace unflex::platform

@@ -1,4 +1,4 @@
-// Names, which are UTF-8 here and UTF-16 in the system, and the system's errors as those of errno.
+// Names, which are UTF-8 here and UTF-16 in the system, and the system's errors as values of errno.
 #pragma once
 
 #include <filesystem>
@@ -12,7 +12,7 @@ namespace unflex::platform {
 [[nodiscard]] std::string name_of(const std::filesystem::path& path);
 [[nodiscard]] std::string utf8(std::wstring_view text);
 
-// What the last call of the system failed of. Sets errno too.
+// The reason why the last call of the system failed. Sets errno too.
 int last_error();
 
 }  // namespace unflex::platform

@@ -1,4 +1,4 @@
-// The program: from what was asked to files, summary and exit code.
+// The program: from the user's request to files, summary and exit code.
 #pragma once
 
 #include "unflex/app/run_config.hpp"
@@ -10,7 +10,7 @@ namespace unflex::app {
 // any thread exists.
 [[nodiscard]] int run(const RunConfig& config);
 
-// The command line and then the work; what main() does.
+// Reads the command line and does the work. main() calls it.
 [[nodiscard]] int run_program(const std::vector<std::string>& arguments);
 
 }  // namespace unflex::app

@@ -1,4 +1,4 @@
-// What the user asked for, as plain data.
+// The user's request as plain data.
 #pragma once
 
 #include <array>
@@ -49,20 +49,20 @@ enum class ExitCode : int {
 // The name that stands for stdin or stdout.
 inline constexpr std::string_view kStandardStream = "-";
 
-// What `identify` works on.
+// The settings of `identify`.
 struct IdentifyConfig {
   std::vector<std::string> records;
   std::optional<identify::Axis> axis;  // axis of all records; unset: as each record tells
   identify::Sweep sweep;
   std::optional<identify::Tower> tower;
-  // The mode behind those that the printer is compensated for is looked for (identify --second).
+  // Looks for the mode behind those that the printer is compensated for (identify --second).
   bool second = false;
   std::array<std::vector<identify::ModeOfAxis>, 2> known = {};  // X's and Y's, for `second`
-  // The axis that a test of stops is written for, instead (identify --make-test).
+  // Writes a test of stops for this axis instead (identify --make-test).
   std::optional<identify::Axis> make_test;
 };
 
-// What `tune` works on, besides the tower to read (RunConfig::input, empty for the first tower).
+// The settings of `tune`, besides the tower to read (RunConfig::input, empty for the first tower).
 struct TuneConfig {
   // The bands without waves, for X and Y.
   std::array<std::optional<tune::Zone>, 2> zones;
@@ -74,9 +74,9 @@ struct TuneConfig {
   std::optional<double> accel_mm_s2 = {};  // of the tower, instead of the printer's own
 };
 
-// What `hotend` works on, besides a log (RunConfig::input) or a printer's model.
+// The settings of `hotend`, besides a log (RunConfig::input) or a printer's model.
 struct HotendConfig {
-  std::optional<double> full_power;  // what means full power in the log
+  std::optional<double> full_power;  // the log's value for full power
   std::optional<std::string> heater;
   std::optional<double> ambient_c;
   std::optional<double> ultimate_gain;  // --ku, counts per °C
@@ -96,11 +96,11 @@ struct Shard {
   unsigned count = 1;
 };
 
-// How `study` works on the thesis' cases, or on a print (RunConfig::input).
+// The settings of `study` for the thesis' cases, or for a print (RunConfig::input).
 struct StudyConfig {
   std::vector<std::string> cases;  // names; empty: all
   std::string machines;            // folder of records; empty: none
-  // Tolerances that the print is to keep, µm, and whether it shall at all times.
+  // Tolerances that the print must keep, µm, and whether it must keep them at all times.
   std::vector<double> tolerances_um;
   bool at_all_times = false;
   // Accelerations to compensate the print at, whether the print's own ones are scaled, and the RMS
@@ -141,9 +141,9 @@ struct RunConfig {
   std::optional<std::string> printer_file;
   std::vector<std::string> overrides;  // "key=value"
   std::optional<std::string> report;   // a file ending in .json or .html, or "-"; batch: a folder
-  std::optional<std::string> log;      // compensate: file to which all that was said is added
-  // compensate: what messages call the print, and what the slicer that started the program says of
-  // the printer (hook.hpp)
+  std::optional<std::string> log;      // compensate: file to which all messages are added
+  // compensate: the print's name in messages, and the printer's settings from the slicer that
+  // started the program (hook.hpp)
   std::string print_name;
   machine::SlicerVariables slicer_settings;
   std::optional<double> max_deviation_mm;

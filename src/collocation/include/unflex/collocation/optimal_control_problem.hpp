@@ -24,7 +24,7 @@ using StateByPoint =
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxStates, kMaxPoint>;
 using PointByPoint = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxPoint, kMaxPoint>;
 
-// Which entries of a derivative can be non-zero at all.
+// The entries of a derivative that can be non-zero at all.
 using StateByPointPattern =
     Eigen::Matrix<bool, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxStates, kMaxPoint>;
 using PointByPointPattern =

@@ -86,8 +86,8 @@ struct AxisWindow {
   [[nodiscard]] const std::vector<double>& aim_mm(std::size_t i) const {
     return aims_mm.empty() ? reference_mm : aims_mm[i];
   }
-  // `nozzle` is a state of `axis` while the base is at base_mm. Returns the state of model i that
-  // swings as it does.
+  // Returns the state of model i with the swing that `nozzle` has. `nozzle` is a state of `axis`
+  // while the base is at base_mm.
   [[nodiscard]] dynamics::NozzleState in_model(std::size_t i, const dynamics::NozzleState& nozzle,
                                                double base_mm) const;
 };
@@ -124,9 +124,9 @@ class Engine {
 // unflex's own. Any number of threads may solve at once, with one engine or several.
 [[nodiscard]] std::unique_ptr<Engine> make_banded_engine();
 
-// As make_banded_engine(), but sooner content, for who solves again and again on the way to
-// something else: limits may be exceeded by a ten-thousandth, and the cost is as much above the
-// optimum.
+// A make_banded_engine() that stops earlier, for callers that solve many windows as intermediate
+// steps. Limits may be exceeded by a ten-thousandth, and the cost may be above the optimum by a
+// ten-thousandth.
 [[nodiscard]] std::unique_ptr<Engine> make_rough_engine();
 
 }  // namespace unflex::compensate

@@ -1,5 +1,5 @@
-// Makes plants of a band: of all that an axis may be whose frequencies and damping ratios are not
-// known exactly.
+// Makes plants of a band. The band is the set of possible axes while frequencies and damping ratios
+// are not known exactly.
 #pragma once
 
 #include <vector>
@@ -9,8 +9,7 @@
 
 namespace unflex::compensate {
 
-// By which share of itself each frequency and each damping ratio may be off, either way. 0: it is
-// exact.
+// The share by which each frequency and each damping ratio may be off, either way. 0: exact.
 struct Band {
   double freq_error = 0.0;
   double damping_error = 0.0;

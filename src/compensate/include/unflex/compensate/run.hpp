@@ -34,7 +34,8 @@ struct ModelPair : Axes<std::size_t> {
   double share = 1.0;
 };
 
-// What strays from the path counts, and what is early or late on it hardly does (contour.hpp).
+// Settings under which the error across the path counts, and the error along the path hardly counts
+// (contour.hpp).
 struct Contour {
   double along_weight = 0.01;         // ε
   double corner_weight = 5.0;         // λ
@@ -49,8 +50,8 @@ struct Contour {
 [[nodiscard]] std::vector<ModelPair> pairs_of(const Axes<AxisSetup>& setup);
 
 struct Setup : Axes<AxisSetup> {
-  // Whether limits of velocity and acceleration, the same for X and Y, are those of motors that
-  // move both: |ẋ| + |ẏ| ≤ V, |ẍ| + |ÿ| ≤ A.
+  // Whether the limits of velocity and acceleration hold for motors that move both X and Y: |ẋ| +
+  // |ẏ| ≤ V, |ẍ| + |ÿ| ≤ A. They are equal for X and Y then.
   bool shares_motors = false;
   double period_s = 1e-3;
   double lead_in_s = 0.0;          // rest of the reference before the first move
@@ -68,7 +69,7 @@ struct Setup : Axes<AxisSetup> {
   }
 };
 
-// What the nozzle shall follow: the plan of a run, or of a part of one.
+// The motion that the nozzle shall follow: the plan of a run, or of a part of a run.
 struct Course {
   using Moves = std::span<const planner::PlannedMove>;
 
@@ -102,8 +103,8 @@ struct WindowSpan {
   std::size_t last = 0;
   std::size_t core_first = 0;
   std::size_t core_last = 0;
-  // The reference has moved evenly for long, and still does. Any solution would have the base go
-  // with it, so there is nothing to solve.
+  // The reference has long been in even motion, and still is. In any solution the base would follow
+  // it, so there is nothing to solve.
   bool cruise = false;
 };
 
@@ -150,10 +151,10 @@ struct RunWindow : Axes<AxisWindow> {
 // The solution for one axis of a cruise: the reference.
 [[nodiscard]] AxisSolution along(const AxisWindow& window);
 
-// Solves X and Y of a window by the engine; in a cruise the solution is the reference. With a
-// contour the window gets the aims and weights, and if the axes share motors it gets the limits at
-// the nodes, under which each axis by itself has this solution.
 using AxisSolutions = Axes<Result<AxisSolution>>;
+// Solves X and Y of a window by the engine. In a cruise the solution is the reference. With a
+// contour the window gets aims and weights, and if the axes share motors it gets limits at the
+// nodes. Under these each axis by itself has this solution.
 [[nodiscard]] AxisSolutions solve(const Engine& engine, const WindowSpan& span, RunWindow& window);
 
 // The base over all nodes, where `windows` are those of `spans`: solves each window here, and joins
@@ -163,7 +164,7 @@ using AxisSolutions = Axes<Result<AxisSolution>>;
     const std::function<void(const AxisSolution&)>& each = nullptr);
 
 // Makes each axis of a window a problem of its own, as solve() does, for an engine that solves it
-// elsewhere. divider: solves here what has to be solved for that.
+// elsewhere. divider: the engine that solves here what the division into such problems needs.
 void prepare(const Engine& divider, const WindowSpan& span, RunWindow& window);
 
 // Joins the solutions of the windows, in the order of `spans`, blending over the middle of each

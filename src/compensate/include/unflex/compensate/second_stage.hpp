@@ -16,9 +16,9 @@ namespace unflex::compensate {
 // By how many nodes a shaped base begins before the base and ends after it; 0 without pulses.
 [[nodiscard]] std::size_t nodes_of_shaping(const Setup& setup, double period_s);
 
-// The base shaped by the pulses of X and Y, with so many nodes more at its beginning and its end.
-// Beyond its ends it rests. Axes that share motors are both shaped by the pulses of either, since
-// their limits hold for positions of the same moment.
+// The base shaped by the pulses of X and Y. It has nodes_of_shaping() nodes more at its beginning
+// and at its end. The unshaped base rests beyond its ends. Axes that share motors are both shaped
+// by the pulses of either, since their limits hold for positions of the same moment.
 [[nodiscard]] dynamics::BaseTrajectory shaped(const dynamics::BaseTrajectory& base,
                                               const Setup& setup, std::size_t more_before,
                                               std::size_t more_after);

@@ -1,4 +1,4 @@
-// What the operating system's errors mean, for messages.
+// The meaning of the operating system's errors, for messages.
 #pragma once
 
 #include <string>

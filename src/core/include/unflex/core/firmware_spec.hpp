@@ -1,5 +1,5 @@
-// What is special about each firmware, as plain values. What it does with lines, motion and limits
-// is in tables of functions: gcode/firmware_reader.hpp, planner/firmware_planner.hpp and
+// Peculiarities of each firmware, as plain values. Its treatment of lines, motion and limits is in
+// tables of functions: gcode/firmware_reader.hpp, planner/firmware_planner.hpp and
 // emit/firmware_dialect.hpp. All tables of a firmware are in its folder in src/firmware.
 #pragma once
 
@@ -13,7 +13,7 @@
 
 namespace unflex {
 
-// How it reads lines.
+// Peculiarities in reading lines.
 struct FirmwareReading {
   const char* bad_feed = nullptr;       // what is wrong with F0; null: nothing is
   bool takes_several_commands = false;  // a line may have more than one command
@@ -35,7 +35,7 @@ struct FirmwareReading {
   double first_feed_mm_s = 25.0;     // until the first F
 };
 
-// How it moves.
+// Peculiarities in moving.
 struct FirmwareMotion {
   bool rounds_to_steps = true;  // lines begin and end on whole steps
   bool has_axis_limits = true;  // each axis has limits of its own, not all motion together
@@ -52,7 +52,7 @@ struct FirmwareMotion {
   bool has_two_jerks = false;  // one of two jerks is for prints alone
 };
 
-// Its input shaper and its pressure advance.
+// The firmware's input shaper and pressure advance.
 struct FirmwareFilters {
   std::string_view shaper_type = {};    // if none is told
   double shaper_damping_ratio = 0.1;    // if none is told
@@ -68,14 +68,14 @@ struct FirmwareFilters {
   bool advances_in_runs = false;  // its own pressure advance can serve in compensated runs
 };
 
-// How it is written to.
+// Peculiarities of the text that is written for the firmware.
 struct FirmwareWriting {
   std::string_view advance_command = {};  // followed by the advance in s
   bool limits_act_early = false;          // limits also hold for the move in the line before
   bool scales_whole_steps_of_e = false;
   bool units_scale_all_words = false;   // G20 also scales words of lines without motion
   bool can_pause_behind_run = false;    // macros let a pause wait for a run's end
-  std::string_view why_no_macros = {};  // the error for who asks for such macros
+  std::string_view why_no_macros = {};  // the error for a user who asks for macros
   // The codes (M) and names of commands that unflex adds.
   std::span<const int> added_codes = {};
   std::span<const std::string_view> added_names = {};
@@ -85,9 +85,9 @@ struct FirmwareWriting {
   std::string_view record_after = {};
 };
 
-// What holds while nothing is said of it. Sources are where the values are.
+// Values of settings that no source gives. Their origins are cited where the values stand.
 struct FirmwareDefaults {
-  // Limits of Z and E; unset: those of all motion.
+  // Limits of Z and E. Unset: the limits of all motion hold.
   std::optional<double> max_z_velocity_mm_s = {}, max_e_velocity_mm_s = {};
   std::optional<double> max_z_accel_mm_s2 = {}, max_e_accel_mm_s2 = {};
   std::optional<double> command_accel_mm_s2 = {};  // M204; unset: the largest acceleration
@@ -104,7 +104,7 @@ struct FirmwareDefaults {
   bool emit_accel_follows_base = false;               // the acceleration of compensated lines
 };
 
-// What is known of printers that run it.
+// Facts about printers that run the firmware.
 struct FirmwarePrinters {
   bool is_told_kinematics = true;  // the printer tells which motors move what
   bool names_klipper_too = false;  // slicers also give its name to printers with Klipper

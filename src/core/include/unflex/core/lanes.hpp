@@ -2,11 +2,11 @@
 // processors have, or in one of four, which newer ones have. Both do the same operations on the
 // same numbers in the same order, so results do not depend on the processor to the last bit.
 //
-// What shall run with either is a template over `Lanes`, in a file that is included twice: once as
-// it is, and once between UNFLEX_FOUR_LANES_BEGIN and UNFLEX_FOUR_LANES_END, which tell the
-// compiler that it may use the wide registers. Nothing but such templates may stand between these
-// two: a function that other files share would be compiled for newer processors only. The functions
-// here are no members, since GCC 12 breaks down over members without optimisation.
+// Code for both is a template over `Lanes`, in a file that is included twice: once as it is, and
+// once between UNFLEX_FOUR_LANES_BEGIN and UNFLEX_FOUR_LANES_END, which tell the compiler that it
+// may use the wide registers. Nothing but such templates may stand between these two: a function
+// that other files share would be compiled for newer processors only. The functions here are no
+// members, since GCC 12 breaks down over members without optimisation.
 #pragma once
 
 #include <cstddef>
@@ -28,9 +28,9 @@ namespace unflex {
 // The numbers of `Lanes`.
 inline constexpr std::size_t kLanes = 4;
 
-// Which registers to use. The processor decides, and prefer_two_lanes() may decide otherwise.
+// Whether to use the wide registers. The processor decides, unless prefer_two_lanes() overrides it.
 [[nodiscard]] bool has_four_lanes();
-// For all of the process, so that the other way can be tried on a processor that has both.
+// Applies to the whole process. A processor that has both kinds can so try the narrow registers.
 void prefer_two_lanes(bool prefer);
 
 using TwoNumbers [[gnu::vector_size(16)]] = double;
@@ -218,7 +218,7 @@ UNFLEX_FOUR_LANES_END
 #else
 #define UNFLEX_FOUR_LANES_BEGIN
 #define UNFLEX_FOUR_LANES_END
-// There are none, and has_four_lanes() says so.
+// There are no wide registers here, and has_four_lanes() returns false.
 using FourLanes = TwoLanes;
 #endif
 

@@ -9,8 +9,8 @@ namespace unflex {
 
 struct Damping {
   double first = 1e-3;
-  double down = 0.1;  // λ changes so after a step that helps
-  double up = 10.0;   // and so after one that does not
+  double down = 0.1;  // factor of λ after a step that helps
+  double up = 10.0;   // factor of λ after a step that does not help
   double most = 1e12;
 };
 
@@ -19,8 +19,9 @@ struct DampedStep {
   bool ended = false;   // no further one is worth it
 };
 
-// Goes on until a step ends it, none helps or most_steps are taken. linearise(): at the place
-// reached, before each step. attempt(λ): tries a step and takes it if it helps; gives a DampedStep.
+// Makes up to most_steps steps. It ends earlier if a step has `ended` set, or if no λ below `most`
+// gives a step that helps. linearise() is called before each step, at the place reached. attempt(λ)
+// tries a step, takes it if it helps, and returns a DampedStep.
 template <typename Linearise, typename Attempt>
 void descend(const Damping& damping, int most_steps, Linearise&& linearise, Attempt&& attempt) {
   double lambda = damping.first;

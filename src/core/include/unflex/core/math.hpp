@@ -1,6 +1,6 @@
 // Functions of real numbers whose results are the same to the last bit on every processor and
-// system. Those of the C library are not: each library rounds in its own way, and some choose by
-// processor. Emitted files would then depend on where they were made.
+// system. The C library's results are not: each library rounds in its own way, and some choose
+// their code by the processor. Emitted files would then depend on where they were made.
 //
 // Only additions, multiplications, divisions and square roots are used, which IEEE 754 defines to
 // the bit. Results are within 1 ulp of the true value, but for tanh(), which is within 3.
@@ -15,12 +15,12 @@ namespace unflex::math {
 [[nodiscard]] double log(double x);
 [[nodiscard]] double log2(double x);
 [[nodiscard]] double log10(double x);
-// xʸ for x ≥ 0. Of a negative x: not a number, whatever y is.
+// xʸ for x ≥ 0. For a negative x the result is not a number, whatever y is.
 [[nodiscard]] double pow(double x, double y);
 [[nodiscard]] double tanh(double x);
 
-// x in radians. Beyond 3e9 the angle itself is no longer known to 1 ulp, and the result is that of
-// an angle off by 1e-16 of x.
+// x in radians. Beyond 3e9 the result belongs to an angle that is off by 1e-16 of x, so it is not
+// within 1 ulp.
 [[nodiscard]] double sin(double x);
 [[nodiscard]] double cos(double x);
 // In [−π, π]; 0 if both are 0.

@@ -26,8 +26,9 @@ void append_scaled(std::string& out, std::int64_t scaled, int decimals);
 // decimals in [0, 9]; |value| * 10^decimals must fit in an int64.
 [[nodiscard]] std::int64_t to_scaled(double value, int decimals);
 
-// For people: five digits, of larger numbers all before the point, and an exponent only
-// from 1e9 on and below 1e-4. 583.3333 is "583.33", 27239.1 is "27239", 0.25 is "0.25".
+// Text for people, with five digits. Larger numbers keep all digits before the point. An exponent
+// is used only from 1e9 on and below 1e-4. 583.3333 is "583.33", 27239.1 is "27239", 0.25 is
+// "0.25".
 [[nodiscard]] std::string readable(double value);
 
 // 10^decimals, decimals in [0, 9].

@@ -1,5 +1,5 @@
-// What unflex writes besides motion: the comment lines by which it knows its own output, and the
-// names of its Klipper macros (docs/pausing.md).
+// Marks that unflex writes besides motion: the comment lines by which it knows its own output, and
+// the names of its Klipper macros (docs/pausing.md).
 #pragma once
 
 #include <string_view>

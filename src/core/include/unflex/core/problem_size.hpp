@@ -8,7 +8,7 @@ namespace unflex {
 // The sizes of several problems may be added.
 struct ProblemSize {
   std::size_t unknowns = 0;  // 0: there is nothing to solve
-  // Those that the unknowns keep, or as least squares come near to. Limits do not count.
+  // Equations that the unknowns satisfy, exactly or as least squares. Limits do not count.
   std::size_t equations = 0;
 
   void add(const ProblemSize& other) {

@@ -8,7 +8,7 @@
 
 namespace unflex {
 
-// TextStore::rewrite(). `name` is what the error calls the text.
+// Calls TextStore::rewrite() and makes its failure an error, which calls the text `name`.
 [[nodiscard]] Status rewrite_lines(TextStore& text, const std::string& name,
                                    const LineChange& change);
 

@@ -5,7 +5,7 @@
 
 namespace unflex {
 
-// Without blanks and line endings at both ends.
+// The text without blanks and line endings at both ends.
 [[nodiscard]] constexpr std::string_view trimmed(std::string_view text) {
   constexpr std::string_view kBlank = " \t\r\n\v\f";
   const std::size_t first = text.find_first_not_of(kBlank);

@@ -1,6 +1,6 @@
-// Threads and what keeps them apart, and what stands in for them where the library is built without
-// (UNFLEX_THREADS). There, a thread's work is done when somebody waits for its end, and nobody else
-// ever holds a lock or has to be waited for.
+// Threads, locks and conditions, and substitutes for them where the library is built without
+// threads (UNFLEX_THREADS). A substitute thread does its work when somebody waits for its end.
+// Substitute locks and conditions never wait.
 #pragma once
 
 #ifdef UNFLEX_NO_THREADS
@@ -26,7 +26,7 @@ class Condition {
  public:
   void notify_one() {}
   void notify_all() {}
-  // What is waited for must be there already.
+  // The condition must hold already, since no other thread can bring it about.
   template <class Ready>
   void wait(Lock& /*lock*/, const Ready& ready) {
     assert(ready());

@@ -123,25 +123,26 @@ class FlexibleAxis {
   [[nodiscard]] double fastest_rad_s() const;
   // In this time every swing dies away to a fiftieth.
   [[nodiscard]] double settling_s() const;
-  // The longest 1/(4ζω): ∫ of the square of a swing of amplitude 1. A smaller ζ than the least
-  // counts as that.
+  // The longest 1/(4ζω), which is the integral of the square of a swing of amplitude 1. A ζ below
+  // least_zeta counts as least_zeta.
   [[nodiscard]] double ringing_s(double least_zeta) const;
   // The slowest rate at which a free motion dies away, 1/s.
   [[nodiscard]] double decay_per_s() const;
-  // How far base and nozzle are apart at most when both move evenly at this acceleration, or the
-  // base at this speed while dampers hold the nozzle, mm.
+  // The largest distance between base and nozzle, mm. Either both have this constant acceleration,
+  // or the base has this speed and dampers hold the nozzle.
   [[nodiscard]] double largest_lag_mm(double accel_mm_s2, double velocity_mm_s) const;
-  // The nozzle's acceleration when the base is 1 mm ahead, and when it is 1 mm/s faster: Σ gω² and
-  // Σ 2gζω. To a push that is short against all periods the nozzle answers by these alone.
+  // The nozzle's acceleration when the base is 1 mm ahead, Σ gω², and when the base is 1 mm/s
+  // faster, Σ 2gζω. These two alone decide the nozzle's response to a push that is short against
+  // all periods.
   [[nodiscard]] double stiffness_per_s2() const;
   [[nodiscard]] double damping_per_s() const;
 
   // The zeros of the transfer function from base to nozzle, rad/s: while the base moves as e^{st}
   // with s at a zero, the nozzle rests. Those at infinity are left out.
   [[nodiscard]] std::vector<std::complex<double>> zeros() const;
-  // For how long a motion of the base that moves the nozzle nowhere lasts until it has died away to
-  // 10⁻⁵. With one mode it dies at once. Several modes leave the base such a motion near
-  // each antiresonance.
+  // Some motions of the base leave the nozzle at rest. This is the time in which they die away to
+  // 10⁻⁵. With one mode they die at once. With several modes there is such a motion near each
+  // antiresonance.
   [[nodiscard]] double unseen_s() const;
 
   // The axis with a mode that hangs behind its nozzle: p̈₂ = 2ζω(ṗ − ṗ₂) + ω²(p − p₂), by the
@@ -151,10 +152,10 @@ class FlexibleAxis {
   // The axis with all frequencies and all damping ratios times these factors.
   [[nodiscard]] FlexibleAxis detuned(double freq_factor, double damping_factor = 1.0) const;
 
-  // The nozzle that goes along with a base in even motion, as after a long time.
+  // The state of a nozzle that has followed a base in even motion for a long time.
   [[nodiscard]] NozzleState riding(double position_mm, double velocity_mm_s = 0.0) const;
-  // The state of this axis that swings as `nozzle` does, a state of `other` while the base is at
-  // base_mm.
+  // The state of this axis with the swing that `nozzle` has. `nozzle` is a state of `other` while
+  // the base is at base_mm.
   [[nodiscard]] NozzleState swinging_as(const FlexibleAxis& other, const NozzleState& nozzle,
                                         double base_mm) const;
   // The difference between two states as places: Σ |Δq| and Σ |Δq̇|/ω, mm.
@@ -205,7 +206,7 @@ class ExactMap {
   }
 
  private:
-  // What one unit of each makes of a mode's part in one step.
+  // A mode's part after one step, per unit of each quantity.
   struct OfMode {
     double gain = 1.0;
     NozzleMotion of_position;
@@ -222,7 +223,7 @@ class ExactMap {
   return least_of_axes([](const FlexibleAxis& axis) { return axis.slowest_rad_s(); }, axes);
 }
 
-// The nozzle that goes along with a base in even motion on all axes.
+// The state of a nozzle that has followed a base in even motion on all axes for a long time.
 [[nodiscard]] inline NozzleXY riding(const Axes<FlexibleAxis>& axes, const XY& position_mm,
                                      const XY& velocity_mm_s = {}) {
   return map_axes([](const FlexibleAxis& axis, double place_mm,

@@ -33,7 +33,7 @@ struct HotendPressure {
   [[nodiscard]] double pressed_mm(double flow_mm_s) const;
   // P'(q), s.
   [[nodiscard]] double slope_s(double flow_mm_s) const;
-  // This pressure `times` as high.
+  // This pressure, multiplied by `times`.
   [[nodiscard]] HotendPressure scaled(double times) const;
 
   friend bool operator==(const HotendPressure&, const HotendPressure&) = default;

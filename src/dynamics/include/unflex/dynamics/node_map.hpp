@@ -19,8 +19,8 @@ class NodeMap {
   // period_s: between nodes.
   NodeMap(const FlexibleAxis& axis, double period_s);
 
-  // From node k to the next. A base that is joined of parts may be elsewhere at the next node than
-  // it goes to from this one: it jumps there, and the nozzle does not.
+  // Advances the nozzle from node k to the next. A base that is joined from parts may jump at the
+  // next node. The nozzle does not jump with it.
   void advance(const AxisTrajectory& base, std::size_t k, NozzleState& state) const {
     const double v = base.velocity_mm_s[k];
     const double a = base.accel_mm_s2[k];
@@ -43,7 +43,7 @@ class NodeMap {
   }
 
  private:
-  // What one unit of each makes of y and its rate in a period.
+  // y and its rate after one period, per unit of each quantity.
   struct OfMode {
     double gain = 1.0;
     double lead_s = 0.0;

@@ -1,5 +1,5 @@
-// What an input shaper makes of a motion m: Σ A_i m(t − t_i), with the pulses' weights A_i and
-// times t_i. Without pulses the motion stays as it is.
+// A motion m behind an input shaper: Σ A_i m(t − t_i), with the pulses' weights A_i and times t_i.
+// Without pulses the motion stays as it is.
 #pragma once
 
 #include <cstddef>
@@ -28,8 +28,8 @@ inline void add(NozzleMotion& sum, const NozzleMotion& other, double times) {
 }
 inline void add(NozzleState& sum, const NozzleState& other, double times) { sum.add(other, times); }
 
-// The shaped motion at time t. at(i, t): the motion at time t, asked for the i-th pulse; i is 0 if
-// there is none. sum: what there is besides.
+// The shaped motion at time t, added to `sum`. at(i, t) returns the motion at time t for the i-th
+// pulse. Without pulses i is 0.
 template <typename Motion, typename At>
 [[nodiscard]] Motion shaped_at(std::span<const Pulse> pulses, double t, At&& at, Motion sum = {}) {
   if (pulses.empty()) {

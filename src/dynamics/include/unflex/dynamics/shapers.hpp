@@ -37,9 +37,10 @@ inline constexpr std::array<ShaperKind, 6> kShaperKinds = {
 // 0.2 for EI, 2HUMP_EI and 3HUMP_EI, which are fits. Klipper refuses them there.
 [[nodiscard]] double max_damping_ratio(ShaperKind kind);
 
-// What Klipper lets one choose of MZV: how many pulses, 3 to 10, and over which time they are
-// evenly spaced. The time is at least half a damped period, where MZV is ZV, and less than (pulses
-// − 1)/2 of them, where MZV becomes ZV convolved with itself pulses − 2 times.
+// The parameters of MZV in Klipper: the number of pulses, 3 to 10, and the time over which they are
+// evenly spaced. The time is at least half a damped period. At this bound MZV is ZV. The time is
+// less than (pulses − 1)/2 damped periods. At that bound MZV becomes ZV convolved with itself
+// pulses − 2 times.
 struct MzvForm {
   int pulses = 3;
   double duration_periods = 0.75;  // from the first pulse to the last, in damped periods
@@ -58,7 +59,7 @@ struct Shaper {
   ShaperKind kind = ShaperKind::mzv;
   MzvForm form = {};
 
-  // A kind or a form says it all, so either may stand where a shaper is wanted.
+  // These conversions are implicit, since a kind or a form alone describes a shaper.
   constexpr Shaper(ShaperKind of_kind) : kind(of_kind) {}  // NOLINT(google-explicit-constructor)
   constexpr Shaper(MzvForm of_mzv) : form(of_mzv) {}       // NOLINT(google-explicit-constructor)
 };

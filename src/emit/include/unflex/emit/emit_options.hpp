@@ -1,4 +1,4 @@
-// What the emitter has to know of the printer, and how it is to write.
+// Facts of the printer that the emitter needs, and options for writing.
 #pragma once
 
 #include <optional>
@@ -12,13 +12,15 @@
 
 namespace unflex::emit {
 
-// How filament is pressed together for the hotend in a run.
+// Settings for pressing filament together for the hotend in a run.
 struct PressureWriting {
-  // Whether unflex sees to it; else the printer's own pressure advance stays as it is.
+  // Whether unflex presses filament together. Otherwise the printer's own pressure advance stays as
+  // it is.
   bool is_written = false;
-  // Klipper, with a linear hotend: its own advance does it, smoothed over less time.
+  // Klipper with a linear hotend: Klipper's own advance presses filament together, smoothed over
+  // less time.
   bool printer_presses = false;
-  // An advance of 0 is what the file or the printer's configuration has set.
+  // An advance of 0 stands for the advance that the file or the printer's configuration has set.
   dynamics::HotendPressure hotend = {};
   double max_accel_mm_s2 = 10000.0;  // of filament, that the extruder can follow
 };
@@ -41,7 +43,8 @@ struct EmitOptions {
   bool checkpoints = false;
 };
 
-// The hotend of a run: with an advance of 0, it needs what the file or the printer has set.
+// The hotend of a run. An advance of 0 is replaced by the advance that the file or the printer has
+// set.
 [[nodiscard]] dynamics::HotendPressure hotend_of(const EmitOptions& options,
                                                  const gcode::PressureAdvance& of_file);
 

@@ -1,5 +1,6 @@
-// The base's motion as G-code. Firmware plans everything it reads anew; this text is such that the
-// printer still executes the motion as it was meant (docs/firmware.md says why each rule is there).
+// Writes the base's motion as G-code. Firmware plans anew everything that it reads. The text is
+// written so that the printer still executes the intended motion. docs/firmware.md gives the reason
+// for each rule.
 #pragma once
 
 #include <string>
@@ -49,8 +50,8 @@ class Emitter {
   // To be called after the last line.
   void finish(std::string& out);
 
-  // What to type after the print, since the printer's own shaper is off and
-  // not known: "SHAPER_FREQ_X=... SHAPER_FREQ_Y=..."; empty if there is nothing to type.
+  // The words to type after the print, if the printer's own shaper is off and not known:
+  // "SHAPER_FREQ_X=... SHAPER_FREQ_Y=...". Empty if there is nothing to type.
   [[nodiscard]] std::string shaper_left_off() const;
 
   // The printer's state after the output so far.

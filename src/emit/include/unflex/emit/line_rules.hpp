@@ -9,7 +9,7 @@
 
 namespace unflex::emit {
 
-// How far an axis may go.
+// The range of places that an axis may have.
 struct Reach {
   double min_mm = -std::numeric_limits<double>::infinity();
   double max_mm = std::numeric_limits<double>::infinity();
@@ -17,11 +17,11 @@ struct Reach {
 
 struct LineRules {
   Axes<dynamics::FlexibleAxis> nozzle;  // what hangs on the base
-  // The frequencies may be off by this share, up and down. Lines between whole steps suit nozzles
-  // that are. 0: the frequencies are exact.
+  // The frequencies may be off by this share, up and down. Lines between whole steps are chosen to
+  // suit nozzles that are off by it. 0: the frequencies are exact.
   double freq_error = 0.0;
   Axes<Reach> reach;
-  double tolerance_mm = 3e-4;  // largest nozzle error by what one line leaves out
+  double tolerance_mm = 3e-4;  // largest nozzle error that one line may cause
   double min_line_s = 1e-3;    // shortest duration of a line
   double min_line_mm = 0.0;    // shortest length of a line along X or Y
   int min_steps = 1;  // fewest grid steps of a line; the firmware joins shorter lines to the next

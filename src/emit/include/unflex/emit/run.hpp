@@ -52,8 +52,8 @@ struct Run {
   // When the lines just before the run began, in order. The run begins at 0.
   std::vector<double> lines_before_s = {};
   int lines_after = 0;  // how many lines begin within LineRules::burst_s after the run
-  // This part continues the previous one. `from_mm` is where that ended; unset: the grid point
-  // nearest to the base.
+  // This part continues the previous one. `from_mm` is the place where the previous part ended.
+  // Unset: the grid point nearest to the base.
   bool goes_on = false;
   std::optional<XY> from_mm = {};
   double late_s = 0.0;  // how late its first line begins

@@ -5,15 +5,15 @@
 
 namespace unflex::emit {
 
-// What a run asks of X, Y and the filament.
+// Limits that a run needs for X, Y and the filament.
 struct RunLimits {
   double velocity_mm_s = 0.0;
   double accel_mm_s2 = 0.0;
   double corner_velocity_mm_s = 0.0;
 };
 
-// The limits that let a run have that, so that the firmware never slows a line down. Z keeps those
-// of `limits`.
+// Limits high enough for `run`, so that the firmware never slows a line down. Z keeps its limits
+// from `limits`.
 [[nodiscard]] planner::Limits limits_of_runs(const planner::FirmwareConfig& config,
                                              planner::Limits limits, const RunLimits& run);
 

@@ -1,8 +1,7 @@
 // A print whose E suits a filament that is not a full cylinder.
 //
 // Slicers compute E for a full section of the diameter they are told. Where the section holds less,
-// moves that print are to push more of it; how far filament is drawn back and brought forward again
-// is a length, and stays.
+// moves that print push more of it. Retractions are lengths of filament, so they stay.
 #pragma once
 
 #include <cstddef>
@@ -41,13 +40,13 @@ class Fitter {
  public:
   Fitter(FitterOptions options, std::string name);
 
-  // Appends what replaces the line: the line itself, or the line with another E. Before some lines
-  // comes a G92, so that E reads in the printer what the file expects. Lines come in the order of
-  // the file. Errors are of kind input: the
-  // line was fitted before, Klipper would refuse it, or its E cannot be replaced.
+  // Appends the replacement of the line: the line itself, or the line with another E. Before some
+  // lines comes a G92, so that E reads in the printer what the file expects. Lines come in the
+  // order of the file. Errors are of kind input: the line was fitted before, Klipper would refuse
+  // it, or its E cannot be replaced.
   [[nodiscard]] Status fit(const gcode::Line& line, std::string& text);
 
-  // What the last line meant in the sliced file, and the state after it.
+  // The meaning of the last line in the sliced file, and the state after it.
   [[nodiscard]] const gcode::Event& event() const { return event_; }
   [[nodiscard]] const gcode::ModalState& state() const { return sliced_.state(); }
   [[nodiscard]] const Totals& totals() const { return totals_; }
@@ -73,8 +72,8 @@ class Fitter {
   Totals totals_;
   std::vector<Diagnostic> warnings_;
   double at_mm_;  // along the filament
-  // In the unit of E's words: what E reads in the printer less what it reads in the file, and what
-  // rounding has left of it.
+  // Both are in the unit of E's words: E in the printer minus E in the file, and the remainder that
+  // rounding has left.
   double ahead_ = 0.0;
   double left_ = 0.0;
   bool told_of_volume_ = false;

@@ -25,7 +25,7 @@ inline constexpr std::array kXY{X, Y};
 inline constexpr std::array kXYZ{X, Y, Z};
 inline constexpr std::array kXYZE{X, Y, Z, E};
 
-// Whether X and Y are known, of what is known of all axes.
+// Whether X and Y are known. `known`: for each axis, whether it is known.
 [[nodiscard]] inline bool is_xy_known(const std::array<bool, 4>& known) {
   return known[X] && known[Y];
 }
@@ -269,7 +269,7 @@ struct ModalState {
   int plane = 17;                      // G17, G18, G19
   FirmwareRetraction retraction;
   Shaper shaper;  // SET_INPUT_SHAPER, M593; unknown until the file sets it
-  // A macro, a tool change or the like may have set the shaper since the text has.
+  // A macro, a tool change or the like may have set the shaper after the text did.
   Axes<bool> shaper_touched{true, true};
   PressureAdvance pressure_advance;
   AxisValues steps_per_mm;    // M92, where the file sets it
@@ -451,11 +451,11 @@ class Interpreter {
   // of a cancelled object along Z too and does not make up for it (gcode.cpp,
   // get_destination_from_command).
   bool z_left_out_ = false;
-  // X and Y: if the position is unknown, only labels and unknown commands are the reason.
+  // X and Y: whether labels and unknown commands are the only reasons for an unknown position.
   std::array<bool, 2> assumed_{};
-  double swinging_s_ = 0.0;       // for how much longer a nozzle swings that cannot be compensated
-  bool modes_uncertain_ = false;  // a line that may or may not run has set a mode or a limit
-  bool feed_uncertain_ = false;   // a line that may or may not run has set F
+  double swinging_s_ = 0.0;          // for how much longer an uncompensated nozzle swings
+  bool modes_uncertain_ = false;     // a line that may or may not run has set a mode or a limit
+  bool feed_uncertain_ = false;      // a line that may or may not run has set F
   bool told_of_retraction_ = false;  // Klipper: the file has a G10 or G11 that does nothing
   Command command_;                  // command of the line being read; kept for its storage
 };

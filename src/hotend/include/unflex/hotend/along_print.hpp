@@ -64,7 +64,7 @@ struct Loop {
   std::optional<double> heater_w = {};  // at full power, for the load of melting filament
 };
 
-// What the hotend does along a course.
+// The response of the hotend along a course.
 struct PrintResponse {
   // Where the simulation begins. None: no target is known, and nothing below is set.
   std::optional<double> known_from_s;
@@ -110,16 +110,16 @@ struct Ahead {
 enum class AheadWhen { heating, both };
 
 // Chooses the commands that are asked for ahead. A command that does not wait comes so early that
-// the hotend enters the band around the new target when the command is due. The target of one that
-// waits comes so early that the hotend then leaves the band around the old target, so that the
+// the hotend enters the band around the new target when the command is due. If a command waits, its
+// target comes so early that the hotend then leaves the band around the old target, so that the
 // print waits less. A command that cannot stand so early stays. In the simulation filament is never
-// laid outside the band for longer than without.
+// laid outside the band for longer than with the commands in their places.
 [[nodiscard]] std::vector<Ahead> choose_ahead(const Loop& loop, const Course& course,
                                               const std::vector<Command>& commands, double band_c,
                                               AheadWhen when);
 
-// The commands with some of them asked for ahead. One that waits is there twice: its target ahead,
-// the waiting in its place.
+// The commands with some of them asked for ahead. A command that waits is there twice: its target
+// ahead, the wait in its place.
 [[nodiscard]] std::vector<Command> with_ahead(const std::vector<Command>& commands,
                                               const std::vector<Ahead>& ahead);
 

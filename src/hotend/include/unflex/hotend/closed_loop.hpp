@@ -1,4 +1,4 @@
-// What a controller makes of a plant: a step of the target, and a load.
+// The response of a plant with a controller to a step of the target, and to a load.
 #pragma once
 
 #include <optional>

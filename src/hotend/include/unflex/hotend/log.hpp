@@ -29,9 +29,8 @@ struct Log {
 };
 
 struct LogOptions {
-  // What means full power in the log. Without it: 255 in a table, 1 in Klipper's log and 127 in
-  // that of a serial line (Marlin reports half of its 255 counts, temperature.cpp,
-  // getHeaterPower()).
+  // The log's value for full power. Without it: 255 in a table, 1 in Klipper's log and 127 in that
+  // of a serial line (Marlin reports half of its 255 counts, temperature.cpp, getHeaterPower()).
   std::optional<double> full_power;
   // The heater's section in Klipper's configuration. In a serial log "extruder" is T: and @:, and
   // "extruder1" is T1: and @1:.

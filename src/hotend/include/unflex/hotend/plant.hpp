@@ -34,7 +34,7 @@ struct OneLag {
 };
 
 // The gain of a proportional controller at which the loop just keeps oscillating, counts per °C,
-// and the period of that.
+// and the period of this oscillation.
 struct Ultimate {
   double gain = 0.0;
   double period_s = 0.0;
@@ -60,8 +60,8 @@ struct Plant {
 // An error of kind input if a value is not finite, negative, or 0 where the plant needs one.
 [[nodiscard]] Status check(const Plant& plant);
 
-// Solves the phase equation ωθ + atan ωτ₁ + atan ωτ₂ = π, with half of sample_s added to θ for a
-// controller that holds its power so long. An error of kind input without any dead time, since then
+// Solves the phase equation ωθ + atan ωτ₁ + atan ωτ₂ = π. Half of sample_s is added to θ, since a
+// controller holds its power for sample_s. An error of kind input without any dead time, since then
 // no gain makes the loop oscillate.
 [[nodiscard]] Result<Ultimate> ultimate(const Plant& plant, double sample_s = kUsualSample_s);
 
@@ -80,11 +80,10 @@ class Simulation {
   // The plant rests at a temperature, with the power that holds it.
   Simulation(const Plant& plant, double temperature_c);
 
-  // Applies a power for so long. load is what cools the block, in counts, at once and without the
-  // dead time.
+  // Applies a power for step_s. load cools the block, in counts, at once and without the dead time.
   void advance(double power, double step_s, double load = 0.0);
 
-  // What the sensor shows.
+  // The temperature that the sensor shows.
   [[nodiscard]] double temperature_c() const { return plant_.ambient_c + sensor_c_; }
 
  private:
@@ -102,7 +101,7 @@ class Simulation {
   std::deque<Change> changes_;  // applied but not felt yet
 };
 
-// What melts, for the heat that a flow of filament takes.
+// The material that melts, for the heat that a flow of filament takes.
 struct Melt {
   double density_g_cm3 = 1.24;  // of PLA
   double heat_j_g_k = 1.8;      // specific heat of PLA, a mean between room and nozzle

@@ -64,8 +64,8 @@ struct AxisModel {
   [[nodiscard]] const std::vector<ModeOfAxis>& values() const { return plants.front().modes; }
 };
 
-// What was measured and what the model gives, for a drawing: energy over frequency in Hz, or
-// acceleration over time in s. All are relative to the same scale.
+// The measurement and the model for a drawing: energy over frequency in Hz, or acceleration over
+// time in s. All are relative to the same scale.
 struct Curve {
   bool is_spectrum = true;
   std::vector<double> x;
@@ -77,10 +77,10 @@ struct Curve {
 
 struct RecordFit {
   AxisModel model;
-  // Why no model of the record is to be trusted, and what to do. Empty: `model` holds. Otherwise
-  // `model` and `curve` show the closest fit, if there is one.
+  // The reason why no model of the record is trusted, and the remedy. Empty: `model` holds.
+  // Otherwise `model` and `curve` show the closest fit, if there is one.
   std::string refusal;
-  // Along which direction of the sensor the axis moved, a unit vector; zero where nothing tells.
+  // The direction of the sensor along which the axis moved, a unit vector. Zero if nothing tells.
   std::array<double, 3> direction{};
   double unexplained = 0.0;  // share of the measurement that the model does not explain, 0 to 1
   Curve curve;
@@ -107,25 +107,25 @@ struct Sweep {
                                               const Sweep& sweep);
 [[nodiscard]] Result<RecordFit> fit_spectrum(const Spectrum& spectrum, const Sweep& sweep);
 
-// Fits the mode that still rings behind a stop of a compensated axis to a recording of it. `known`:
-// the modes that it is compensated for; the one found is at least 25 % away from them. A stop
-// behind which nothing else rings is refused. A spectrum is an error of kind input.
+// Fits the mode that still rings behind a stop of a compensated axis to a recording of the stop.
+// `known`: the modes that the axis is compensated for. The mode found is at least 25 % away from
+// them. A stop behind which nothing else rings is refused. A spectrum is an error of kind input.
 [[nodiscard]] Result<RecordFit> fit_second(const DataSet& set, Axis axis,
                                            const std::vector<ModeOfAxis>& known);
 
 // Whether the main modes of these models are within 5 % of each other.
 [[nodiscard]] bool agree(const std::vector<AxisModel>& models);
 
-// The plants besides the estimate, at most six. None if all of them swing as it does within 3 %, as
-// those of a good record do. They have modes in common, with each other and with the estimate, as
-// far as that changes how each swings by less than a tenth.
+// The plants besides the estimate, at most six. None if all of them swing like the estimate within
+// 3 %, as in a good record. Plants share modes with each other and with the estimate where this
+// changes the swing of each by less than a tenth.
 [[nodiscard]] std::vector<Plant> other_plants(const AxisModel& model);
 
-// The one of X and Y that moved more.
+// The axis, X or Y, that moved more.
 [[nodiscard]] Axis dominant_axis(const DataSet& set);
 
-// One model from those of several records of an axis, all of them trusted. What the records differ
-// by is part of its intervals and its plants: the axis may be as any of them tells.
+// Combines the models of several records of an axis, all of them trusted. The differences between
+// the records are part of the intervals and the plants: the axis may be as any record tells.
 [[nodiscard]] AxisModel combine(const std::vector<AxisModel>& models);
 
 // A ringing tower: waves `spacing_mm` apart on a wall printed at `speed_mm_s`, and how many times

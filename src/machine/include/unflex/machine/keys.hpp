@@ -1,5 +1,5 @@
-// What there is to configure, as data: the one description from which reading, overriding,
-// checking and the page docs/configuration.md are derived.
+// All keys as data: the one description from which reading, overriding, checking and the page
+// docs/configuration.md are derived.
 #pragma once
 
 #include <string>

@@ -8,7 +8,8 @@
 
 namespace unflex::machine {
 
-// One line per setting that could be better, with what would be; to be shown as warnings.
+// One line for each setting that could be better, with a better value. The lines are to be shown as
+// warnings.
 [[nodiscard]] std::vector<std::string> recommendations(const Settings& settings);
 
 }  // namespace unflex::machine

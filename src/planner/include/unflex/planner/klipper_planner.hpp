@@ -23,9 +23,9 @@ class KlipperPlanner final : public Planner {
   [[nodiscard]] std::size_t pending() const override;
 
  private:
-  // What the lookahead keeps of a queued move. Speeds are squared, mm²/s², because v² changes
-  // linearly along a ramp. "Smooth" is the same motion at the lower acceleration that
-  // minimum_cruise_ratio leaves, (1 − ratio)·a.
+  // Data of a queued move in the lookahead. Speeds are squared, mm²/s², because v² changes linearly
+  // along a ramp. "Smooth" is the same motion at the lower acceleration that minimum_cruise_ratio
+  // leaves, (1 − ratio)·a.
   struct Junction {
     double max_start_v2 = 0.0;         // at the start: the junction's limit, or what is reachable
     double max_smooth_start_v2 = 0.0;  // max_start_v2 with smooth acceleration

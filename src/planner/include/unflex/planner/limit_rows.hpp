@@ -1,4 +1,5 @@
-// Every limit that a file can set, once: where it is held, what the settings and messages call it.
+// A table of every limit that a file can set: the member that holds it, and its names in the
+// settings and in messages.
 #pragma once
 
 #include <array>

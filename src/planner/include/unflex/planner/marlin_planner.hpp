@@ -92,7 +92,7 @@ struct Block {
   PlannedMove move;             // without its trapezoid
 };
 
-// What a junction needs of the block before it.
+// Data of the previous block that a junction needs.
 struct Previous {
   Vector unit{};
   Vector speed_mm_s{};

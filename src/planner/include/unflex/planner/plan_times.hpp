@@ -1,4 +1,4 @@
-// When the moves of a plan happen, and which of them at a time.
+// The times of a plan's moves, and the move at a given time.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +9,7 @@
 
 namespace unflex::planner {
 
-// When each move starts, the first of them at first_s, and when the last one ends.
+// The start of each move, and the end of the last one. The first move starts at first_s.
 [[nodiscard]] std::vector<double> starts_s(std::span<const PlannedMove> moves,
                                            double first_s = 0.0);
 
@@ -17,7 +17,7 @@ namespace unflex::planner {
 // at least one move, as starts_s() has it.
 [[nodiscard]] std::size_t move_at(std::span<const double> starts_s, double t);
 
-// As above, for one time after the other: `from` is the move at an earlier time.
+// The move at time t, for times that rise from call to call: `from` is the move at an earlier time.
 [[nodiscard]] inline std::size_t move_at(std::span<const double> starts_s, double t,
                                          std::size_t from) {
   while (from + 2 < starts_s.size() && starts_s[from + 1] <= t) {

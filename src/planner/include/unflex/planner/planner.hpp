@@ -68,7 +68,7 @@ struct InstalledShaper {
   Axes<double> damping_ratio{0.1, 0.1};
 };
 
-// What only the firmware's configuration decides.
+// Values that only the firmware's configuration decides.
 struct FirmwareConfig {
   Firmware firmware = Firmware::klipper;
   Kinematics kinematics = Kinematics::cartesian;
@@ -199,8 +199,8 @@ class Planner {
 
   // Limits for the moves added from now on.
   void apply(const gcode::LimitChange& change) { planner::apply(change, limits_); }
-  // What a line means to the moves around it: the limits it sets, and that it may have waited for
-  // the moves before.
+  // Applies the effects of a line on the moves around it: the line may set limits, and it may have
+  // waited for the moves before.
   void apply(const gcode::Event& event) {
     if (event.waits_for_buffer) empty_buffer();
     apply(*event.limits);
@@ -222,7 +222,7 @@ class Planner {
   // all moves queued before it.
   virtual std::size_t take(std::vector<PlannedMove>& out) = 0;
 
-  // As take(), with the moves as_played().
+  // Does the work of take(), with the moves as_played().
   std::size_t take_played(std::vector<PlannedMove>& out);
 
   // Moves queued and not yet taken.
@@ -234,7 +234,7 @@ class Planner {
   Limits limits_;
 };
 
-// The limits that the firmware takes where it is told these: RepRapFirmware has a least value of
+// The limits that the firmware uses if it is told `limits`. RepRapFirmware has a least value of
 // each.
 [[nodiscard]] Limits as_accepted(Firmware firmware, const Limits& limits);
 

@@ -15,7 +15,7 @@
 
 namespace unflex::planner {
 
-// What the shaper makes of the motion of each axis. Without pulses it leaves the axis as it is.
+// The shaper's effect on the motion of each axis. Without pulses the motion stays as it is.
 //
 //   b_s(t) = Σ A_i b(t − t_i)     t on the clock of the plan
 //
@@ -36,40 +36,41 @@ struct Shaping : Axes<dynamics::ShaperPulses> {
   [[nodiscard]] double length_s() const;
 };
 
-// The pulses of the shaper. Types and damping ratios that the file has not set are those of the
+// The pulses of the shaper. Types and damping ratios that the file has not set are taken from the
 // configuration. An unknown type counts as the firmware's default.
 [[nodiscard]] Shaping shaping(const FirmwareConfig& config, const gcode::Shaper& shaper);
 
 // The firmware's pressure advance in force.
 struct FirmwareAdvance {
   double advance_s = 0.0;
-  double smooth_s = 0.0;  // Klipper's smooth time; 0 where the advance is
+  double smooth_s = 0.0;  // Klipper's smooth time; 0 if the advance is 0
 
   friend bool operator==(const FirmwareAdvance&, const FirmwareAdvance&) = default;
 };
 
-// What the file has not set is the configuration's.
+// The advance in force. Values that the file has not set are the configuration's.
 [[nodiscard]] FirmwareAdvance advance_in_force(const FirmwareConfig& config,
                                                const gcode::PressureAdvance& of_file);
 
-// What filters a printer's steps.
+// The filters of a printer's steps.
 struct Filters {
   gcode::Shaper shaper;
   gcode::PressureAdvance advance = {};
 };
 
-// The shortest time that the machine stands still when a line changes the filters. 0 if they are
-// the same.
+// The shortest time that the machine stands still when a line changes the filters. 0 if they do not
+// change.
 //
 // Klipper generates all steps of what is queued. This takes as long as its filters look ahead and
 // back, once with the old settings and once with the new ones (flush_all_steps,
 // calc_step_gen_restart):
 //   stop = d(before) + d(after),   d = max(1 ms, reach of the shaper, half of the smooth time of
 //   pressure advance)
-// It does so for a new smooth time too, which is 0 where pressure advance is
+// Klipper does so for a new smooth time too. The smooth time is 0 if pressure advance is 0
 // (kinematics/extruder.py, _set_pressure_advance).
-// Marlin waits until the delayed part of the motion is over. RepRapFirmware does so too, and starts
-// from standstill when it has waited 10 ms for further lines (Configuration.h, DefaultGracePeriod).
+// Marlin waits until the delayed part of the motion is over. RepRapFirmware waits for it too, and
+// starts from standstill when it has waited 10 ms for further lines (Configuration.h,
+// DefaultGracePeriod).
 [[nodiscard]] double switching_s(const FirmwareConfig& config, const Filters& before,
                                  const Filters& after);
 

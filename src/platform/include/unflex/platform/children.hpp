@@ -21,12 +21,12 @@ struct Child {
   FileDescriptor channel;  // to and from the child
 };
 
-// What a child does, with its end of the channel. True if it ended well.
+// The work of a child, with its end of the channel. True if it ended well.
 using ChildWork = std::function<bool(int channel)>;
 
 enum class OnInterrupt { remember, leave_to_parent };
 
-// Forks a process that works and ends; nothing that this process has open is flushed twice, and no
+// Forks a process that works and ends. Open streams of this process are not flushed twice, and no
 // exception gets out. A child is killed when its parent is. `others` are closed in the child. The
 // error is a text.
 [[nodiscard]] tl::expected<Child, std::string> fork_child(const ChildWork& work,
@@ -44,7 +44,7 @@ enum class OnInterrupt { remember, leave_to_parent };
 
 // How a child ended: "" if well, else what happened to it.
 [[nodiscard]] std::string wait_for_end(const Child& child);
-// Whether it has ended; then its number is free again.
+// Whether the child has ended. If it has, its number is free again.
 [[nodiscard]] bool has_ended(const Child& child);
 void ask_to_end(const Child& child);
 void kill_child(const Child& child);  // and waits for its end

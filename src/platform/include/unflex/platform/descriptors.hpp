@@ -22,7 +22,7 @@ class FileDescriptor {
  public:
   FileDescriptor() = default;
   explicit FileDescriptor(int fd) : fd_(fd) {}
-  // One that somebody else closes, such as a standard stream.
+  // A descriptor that somebody else closes, such as a standard stream.
   [[nodiscard]] static FileDescriptor borrowed(int fd);
   FileDescriptor(FileDescriptor&& other) noexcept;
   FileDescriptor& operator=(FileDescriptor&& other) noexcept;
@@ -38,27 +38,28 @@ class FileDescriptor {
   bool is_borrowed_ = false;
 };
 
-// If they fail, the descriptor is not valid and errno tells why. No other program that this one
-// starts has them.
+// If opening fails, the descriptor is not valid and errno tells why. Programs that this one starts
+// do not inherit these descriptors.
 [[nodiscard]] FileDescriptor open_to_read(const std::string& name);
-// What is there already: a device or a pipe.
+// Opens a device or a pipe that is there already.
 [[nodiscard]] FileDescriptor open_to_write(const std::string& name);
-// All writes go to the end. The file is made if there is none.
+// Opens a file so that all writes go to its end. The file is made if there is none.
 [[nodiscard]] FileDescriptor open_to_append(const std::string& name);
 
 // Waits until there is something to read, be it the end or an error. False if there is nothing yet.
 [[nodiscard]] bool wait_to_read(int descriptor, std::chrono::milliseconds most);
 [[nodiscard]] bool wait_to_write(int descriptor, std::chrono::milliseconds most);
 
-// How many bytes were read or written, 0 at the end; a negative number if that failed, and errno.
+// The number of bytes read or written; 0 at the end. A negative number if the call failed; errno
+// tells why.
 [[nodiscard]] std::ptrdiff_t read_bytes(int descriptor, char* to, std::size_t room);
 [[nodiscard]] std::ptrdiff_t write_bytes(int descriptor, std::string_view bytes);
-// From a place counted from the file's beginning. Does not move to where read_bytes() goes on,
-// except on Windows.
+// Reads from a place counted from the file's beginning. read_bytes() still goes on from where it
+// was, except on Windows.
 [[nodiscard]] std::ptrdiff_t read_bytes_at(int descriptor, char* to, std::size_t room,
                                            std::uint64_t at);
 
-// The descriptor must outlive what is returned.
+// The descriptor must outlive the source or sink.
 [[nodiscard]] std::shared_ptr<ByteSource> descriptor_source(int descriptor);
 [[nodiscard]] std::shared_ptr<ByteSink> descriptor_sink(int descriptor);
 // The text of a file, to be read only.

@@ -1,4 +1,4 @@
-// What stands behind a name: a file, a folder, a link; and what is in a folder.
+// The objects behind names (a file, a folder, a link), and the contents of folders.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@ namespace unflex::platform {
 
 enum class FileKind { file, folder, other };
 
-// A file that is written to or replaced gets another state.
+// The state of a file. It changes when the file is written to or replaced.
 struct FileState {
   FileKind kind = FileKind::other;
   std::uint64_t device = 0;
@@ -23,7 +23,8 @@ struct FileState {
   [[nodiscard]] bool operator==(const FileState&) const = default;
 };
 
-// The state of what a name leads to, by links too, or of an open file. Or the errno.
+// The state of the object that a name leads to, also by links, or of an open file. The error is an
+// errno.
 [[nodiscard]] tl::expected<FileState, int> state_of(const std::string& name);
 [[nodiscard]] tl::expected<FileState, int> state_of(int descriptor);
 
@@ -41,12 +42,12 @@ struct FolderEntry {
   std::uint64_t bytes = 0;       // of a file
 };
 
-// Sorted by name, or the errno.
+// The entries, sorted by name, or the errno.
 [[nodiscard]] tl::expected<std::vector<FolderEntry>, int> entries_of(const std::string& folder);
 
-// With all folders above it that are missing. 0 or the errno.
+// Makes the folder, and all missing folders above it. 0 or the errno.
 [[nodiscard]] int make_folders(const std::string& folder);
-// Leaves it if it is not empty.
+// Removes the folder if it is empty.
 void remove_empty_folder(const std::string& folder);
 
 }  // namespace unflex::platform

@@ -8,8 +8,9 @@
 namespace unflex::platform {
 
 // To be called first. A standard stream that was closed would be given to the next file opened, and
-// messages would land in it; so it is replaced by one whose use is an error. Bytes go through the
-// streams as they are. What a long run needs of memory goes back to the system when it is written.
+// messages would land in that file. So the stream is replaced by one whose use is an error. Bytes
+// go through the streams as they are. The memory that a long run needs goes back to the system when
+// the run is written.
 void prepare_process();
 
 // Arguments behind the program's name, in UTF-8 where the system knows what text is.
@@ -21,9 +22,9 @@ void prepare_process();
 [[nodiscard]] long process_number();
 
 [[nodiscard]] bool is_terminal(int descriptor);
-// Whether it is a terminal that moves its cursor and shows colours where escape sequences say so.
+// Whether the descriptor is a terminal that takes escape sequences for its cursor and colours.
 [[nodiscard]] bool takes_escape_sequences(int descriptor);
-// How wide a terminal is; 0 if that is not known.
+// The width of a terminal; 0 if it is not known.
 [[nodiscard]] unsigned columns_of(int descriptor);
 
 }  // namespace unflex::platform

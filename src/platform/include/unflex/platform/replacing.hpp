@@ -10,7 +10,7 @@
 
 namespace unflex::platform {
 
-// Where files may lie that are soon removed, and the environment variable that chooses the place.
+// The folder for files that are soon removed, and the environment variable that chooses the folder.
 [[nodiscard]] std::string temporary_directory();
 extern const std::string_view kTemporaryDirectoryVariable;
 
@@ -25,7 +25,8 @@ struct LockedFile {
 // Makes a file with a temporary name that nobody has. Others cannot lock it while it is open, if
 // the file system has locks.
 [[nodiscard]] tl::expected<LockedFile, int> make_locked_file(const std::string& folder);
-// Whether a name without folder is one that such a file has: ".unflex-", six letters, ".tmp".
+// Whether a name without folder has the form of such a temporary name: ".unflex-", six letters,
+// ".tmp".
 [[nodiscard]] bool is_temporary_name(std::string_view name);
 
 enum class Removal { done, in_use, not_ours };
@@ -35,8 +36,8 @@ bool remove_file(const std::string& name);
 
 enum class Claim { alone, with_others };
 // A claim on a folder, which ends with the descriptor. The error is EWOULDBLOCK if another process
-// has one that does not go with this. What cannot be claimed there, as on some network file
-// systems, is given as if it could.
+// has a claim that excludes this one. Where folders cannot be claimed, as on some network file
+// systems, the claim counts as given.
 [[nodiscard]] tl::expected<FileDescriptor, int> claim_folder(const std::string& folder,
                                                              Claim claim);
 
@@ -47,9 +48,9 @@ enum class Claim { alone, with_others };
 [[nodiscard]] int take_over_permissions(int descriptor, const std::string& replaced);
 // Puts what was written on the disk. 0 if that was done.
 [[nodiscard]] int sync_file(int descriptor);
-// One file takes the name of another, in the same folder, at once. 0 if that was done.
+// Gives a file the name of another one in the same folder, at once. 0 if that was done.
 [[nodiscard]] int replace_file(const std::string& from, const std::string& to);
-// Puts names on the disk. What goes wrong has no consequence.
+// Puts the folder's names on the disk. Failures are ignored.
 void sync_folder(const std::string& folder);
 
 // A name of the file that a descriptor was redirected to, "" if it is none.

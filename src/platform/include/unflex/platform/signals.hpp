@@ -22,8 +22,8 @@ void expect_a_result();
 void note_result();
 [[nodiscard]] bool has_result();
 
-// The first of the signals that came, or 0. What a signal handler tells the rest of the process,
-// and what it has to know, can only live in static variables; these are the only ones.
+// The first of the signals that came, or 0. A signal handler can share data with the rest of the
+// process only by static variables; these are the only ones.
 [[nodiscard]] int ending_signal();
 
 // remove_if_cut_short() names a file that this process must not leave behind if a signal ends it,

@@ -1,4 +1,5 @@
-// What the process and its children have taken so far; 0 where the system does not tell.
+// The resources that the process and its children have taken so far; 0 where the system does not
+// tell.
 #pragma once
 
 namespace unflex::platform {

@@ -89,9 +89,10 @@ class ElasticProgram {
   std::size_t add_rows_at(std::size_t row, std::size_t& side);
   [[nodiscard]] bool factor();
   void back_substitute(std::vector<double>& x) const;
-  // The step towards τ = 0, and the forces of the corrector. Returns how much of it can be gone.
+  // Finds the step towards τ = 0 and the forces of the corrector. Returns the share of the step
+  // that can be taken.
   double predict();
-  // The step towards τ. Returns how much of it can be gone.
+  // Finds the step towards τ. Returns the share of the step that can be taken.
   double correct(double target);
   // Sets the steps of a side whose row moves by `along`, and shortens `length` to what they allow.
   static void move(double target, double along, Side& side, double& length);

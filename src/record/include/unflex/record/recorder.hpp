@@ -1,4 +1,4 @@
-// Gathers what a page shows of a print while it is verified, in bounded memory.
+// Gathers the data for a print's page while the print is verified, in bounded memory.
 #pragma once
 
 #include <cstddef>
@@ -24,7 +24,7 @@ struct PrinterShaper {
 struct Options {
   verify::NozzleModel nozzle;                     // Rules::nozzle of the verification
   std::optional<PrinterShaper> printer_shaper{};  // nullopt if it has none or none is known
-  // What else the print is measured with.
+  // Further shapers that the print is measured with.
   std::span<const dynamics::ShaperKind> shapers = dynamics::kShaperKinds;
   std::size_t paths_bytes = 1'500'000;
   std::size_t places = 12;  // number of worst places, for each of before and after

@@ -21,7 +21,7 @@ namespace unflex::report {
 
 // "16.2 → 0.54": shares as percent, without the unit.
 [[nodiscard]] std::string percent_change_text(double from, double to);
-// As that, the RMS error of the line's width if the hotend is another.
+// The RMS error of the line's width with another hotend, in the form of percent_change_text().
 [[nodiscard]] std::string width_change_text(const verify::LineStats& before,
                                             const verify::LineStats& after,
                                             verify::OtherHotend hotend);
@@ -42,12 +42,12 @@ namespace unflex::report {
 // The rates of the motors as a line of a summary; empty where no steps per mm are known.
 // has_output: whether there are emitted lines.
 [[nodiscard]] std::string step_rates_text(const StepRates& rates, bool has_output);
-// As that, without the line's name and its ending.
+// The text of step_rates_text() without the line's name and its ending.
 [[nodiscard]] std::string step_rates_list(const StepRates& rates, bool has_output);
 
 // How far the hotend is off its target, as a line of a summary; empty without a model of it.
 [[nodiscard]] std::string temperature_text(const std::optional<Temperature>& temperature);
-// As that, thing by thing.
+// The parts of temperature_text(), one by one.
 [[nodiscard]] std::vector<std::string> temperature_list(const Temperature& temperature);
 
 // 3725.4 → "1h 02m 05s"; below a minute with tenths, "5.3s".

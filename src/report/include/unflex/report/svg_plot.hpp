@@ -34,7 +34,7 @@ struct Plot {
   std::string y_label;
   int width_px = 340;
   int height_px = 240;
-  // What is shown; unset: all curves, with some room.
+  // The ranges that are shown. Unset: all curves, with some room.
   std::optional<PlotRange> x = std::nullopt;
   std::optional<PlotRange> y = std::nullopt;
   bool log_x = false;        // logarithmic in x, whose values and range are above 0

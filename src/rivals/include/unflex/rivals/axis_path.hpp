@@ -1,5 +1,5 @@
-// The motion of one axis as a row of parabolas: the base's motion by any method, and what the
-// nozzle that hangs on it does.
+// The motion of one axis as a row of parabolas: the base's motion by any method, and the motion of
+// the nozzle that hangs on it.
 //
 //   b, p   base and nozzle       r   reference, the plan's own motion
 #pragma once
@@ -28,7 +28,7 @@ struct Parabola {
 // The last parabola lasts for ever.
 using AxisPath = std::vector<Parabola>;
 
-// The path that a method found by solving something.
+// A path that a method found by solving equations.
 struct SolvedPath {
   AxisPath path;
   ProblemSize size;

@@ -27,7 +27,7 @@ struct SplineOptions {
   double tail_s = 0.0;     // the base may still move for this long after the reference
 };
 
-// Its unknowns are the coefficients that are free, its equations the samples.
+// The unknowns of the problem are the free coefficients. Its equations are the samples.
 [[nodiscard]] SolvedPath filtered_spline(const AxisPath& reference,
                                          const dynamics::FlexibleAxis& axis,
                                          const SplineOptions& options);

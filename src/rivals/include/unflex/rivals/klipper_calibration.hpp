@@ -24,7 +24,7 @@ struct FittedShaper {
   double smoothing_mm = 0.0;
   double score = 0.0;
 
-  // Its pulses, for the damping ratio that Klipper takes if it is told none.
+  // The shaper's pulses, for the damping ratio that Klipper takes if it is told none.
   [[nodiscard]] dynamics::ShaperPulses pulses() const;
 };
 
@@ -43,8 +43,8 @@ struct KlipperCalibration {
 // The corner speed that the calibration assumes.
 inline constexpr double kCalibrationCorner_mm_s = 5.0;
 
-// The most acceleration that the calibration advises with a shaper: at it the shaper cuts a corner
-// by 0.12 mm (find_shaper_max_accel). 0 if it does so at any.
+// The largest acceleration that the calibration advises with a shaper: there the shaper cuts a
+// corner by 0.12 mm (find_shaper_max_accel). 0 if it cuts that much at any acceleration.
 [[nodiscard]] double advised_accel_mm_s2(const dynamics::ShaperPulses& pulses);
 
 // `density`: sum over the sensor's columns at k · step_hz, acceleration² per Hz. nullopt if there

@@ -1,4 +1,4 @@
-// What each run is worked out with, or why it is kept.
+// Decides the setup with which each run is worked out, or the reason why it is kept.
 #pragma once
 
 #include <string>

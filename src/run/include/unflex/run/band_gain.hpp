@@ -1,5 +1,5 @@
-// What the print would gain if the frequencies were known better, where its timing is free: some of
-// its runs are timed once more, for half the band.
+// The gain of a print with free timing if its frequencies were known better. Some of its runs are
+// timed once more, for half the band.
 #pragma once
 
 #include <optional>
@@ -25,12 +25,12 @@ class BandGain {
  private:
   const machine::Settings* settings_;
   double freq_error_;                       // of the narrower band
-  std::optional<compensate::Setup> setup_;  // for it
+  std::optional<compensate::Setup> setup_;  // for the narrower band
   double offered_s_ = 0.0;                  // of all runs, as sliced
-  double chosen_s_ = 0.0;                   // of those of the sample
+  double chosen_s_ = 0.0;                   // of the sample's runs, as sliced
   double timed_s_ = 0.0;                    // of all runs, as timed
-  double sampled_s_ = 0.0;                  // of those of the sample, as timed
-  double narrow_s_ = 0.0;                   // and for the narrower band
+  double sampled_s_ = 0.0;                  // of the sample's runs, as timed
+  double narrow_s_ = 0.0;                   // of the sample's runs, as timed for the narrower band
 };
 
 }  // namespace unflex::run

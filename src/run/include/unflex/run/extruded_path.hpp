@@ -1,4 +1,5 @@
-// What share of the extruded path is compensated, and what keeps the rest as it was sliced.
+// The share of the extruded path that is compensated, and the reasons that keep the rest as it was
+// sliced.
 #pragma once
 
 #include <cstddef>

@@ -15,8 +15,8 @@
 
 namespace unflex::run {
 
-// How the nozzle strays from the run, in the timing of `reference`, while the base makes the moves
-// `base`. It is sampled as finely as the nozzle's ringing needs, more coarsely than in a
+// The nozzle's deviation from the run, in the timing of `reference`, while the base makes the moves
+// `base`. It is sampled as finely as the nozzle's ringing needs, but more coarsely than in a
 // verification.
 [[nodiscard]] verify::RunDeviation deviation_of(const Piece& run,
                                                 const std::vector<planner::PlannedMove>& reference,
@@ -24,18 +24,18 @@ namespace unflex::run {
                                                 const dynamics::NozzleXY& nozzle,
                                                 const verify::Rules& rules, double lead_in_s);
 
-// How the nozzle strays from the run if its sliced moves are carried out.
+// The nozzle's deviation from the run if the run's sliced moves are carried out.
 [[nodiscard]] verify::RunDeviation deviation_as_sliced(const Piece& run,
                                                        const dynamics::NozzleXY& nozzle,
                                                        const verify::Rules& rules);
 
-// What is around the text, if it is a part of a run or the printer passes into it from kept lines.
+// The motion around the text, if the text is a part of a run or follows kept lines without a stop.
 struct InMotion {
   std::vector<gcode::Segment>
       lines_before;           // the last lines before the text; none: it begins at rest
   bool goes_on = false;       // another part follows
   bool may_be_worse = false;  // by a little, since the part must be written
-  // Where the last move ended that the firmware has made.
+  // The end of the last move that the firmware has made.
   std::optional<gcode::Position> machine_mm = std::nullopt;
 };
 
@@ -58,7 +58,7 @@ inline constexpr double kLeewayTimes = 2.2;
 inline constexpr double kLeewayRms_mm = kBearableRms_mm;
 inline constexpr double kLeeway_mm = 30e-3;
 
-// How an objection begins that is against no limit.
+// The beginning of an objection that names no broken limit.
 inline constexpr std::string_view kWorse = "compensation would be worse: ";
 
 // Replays the text of a compensated run as the printer would, in the state the printer is in before

@@ -1,5 +1,5 @@
-// How long layers last whose timing is chosen anew. Slicers slow small layers down so that they
-// cool, so a layer is not made shorter than a least time unless it was sliced so.
+// The durations of layers whose timing is chosen anew. Slicers slow small layers down so that they
+// cool. So a layer is not made shorter than a least time, unless it was sliced shorter.
 //
 //   T   the lesser of the least time and the layer's duration as sliced
 //   k   by how much its runs are stretched
@@ -21,8 +21,9 @@ class LayerTimes {
   // 0: no layer is stretched.
   explicit LayerTimes(double least_s) : least_s_(least_s) {}
 
-  // The next piece of the file. It belongs to the layer in which it begins, and a part to that in
-  // which its run begins. What stands before the first comment that begins a layer is none.
+  // The next piece of the file. A piece belongs to the layer in which it begins, and a part of a
+  // run to the layer in which the run begins. Pieces before the first comment that begins a layer
+  // belong to none.
   void add(const std::shared_ptr<RunJob>& job);
   // There are no more pieces.
   void end();

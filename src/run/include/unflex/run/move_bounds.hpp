@@ -1,4 +1,4 @@
-// What a run may do where its timing is free.
+// Bounds for a run whose timing is free.
 #pragma once
 
 #include <optional>
@@ -11,10 +11,11 @@
 
 namespace unflex::run {
 
-// What each move of the run may do.
+// The bounds of each move of the run.
 [[nodiscard]] std::vector<timing::MoveBounds> move_bounds(const Piece& run,
                                                           const machine::Settings& settings);
-// What lays the run, and how evenly it is to lay; nullopt: its width does not count.
+// The extruder that lays the run, and how evenly it shall lay. nullopt: the run's width does not
+// count.
 [[nodiscard]] std::optional<timing::Extruder> extruder_of(const Piece& run,
                                                           const emit::EmitOptions& options,
                                                           const machine::TimingSettings& timing);

@@ -1,5 +1,6 @@
-// Which runs find a base for the nominal axes alone, too: an eighth of the print, or its beginning.
-// It takes as long as the other base, and only shows what suiting a band costs.
+// Chooses the runs for which a second base is found, for the nominal axes alone: an eighth of the
+// print, or its beginning. The second base takes as long as the first, and only shows the cost of
+// suiting a band.
 #pragma once
 
 #include <algorithm>
@@ -23,7 +24,7 @@ class NominalSample {
 
  private:
   double offered_s_ = 0.0;  // how long all runs so far take
-  double chosen_s_ = 0.0;   // and those that were chosen
+  double chosen_s_ = 0.0;   // how long the chosen runs take
 };
 
 }  // namespace unflex::run

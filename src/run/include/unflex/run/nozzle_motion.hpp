@@ -1,4 +1,4 @@
-// What the nozzle does while the base moves as planned, exactly.
+// The exact motion of the nozzle while the base moves as planned.
 #pragma once
 
 #include <array>
@@ -56,8 +56,8 @@ class NozzleOnBase {
 // The nozzle from piece to piece, the printer's own shaper included.
 //
 // A shaper's base is a weighted sum of shifted motions, b_s(t) = Σ A_i b(t − t_i), and the nozzle's
-// response is linear. So the shaped nozzle is such a sum of a nozzle u that hangs on the unshaped
-// base. Only u is followed, from rest:
+// response is linear. So the shaped nozzle is the same weighted sum for a nozzle u that hangs on
+// the unshaped base. Only u is followed, from rest:
 //
 //   p(t) = Σ A_i u(t − t_i) + e^{-ζωt}(…)
 //

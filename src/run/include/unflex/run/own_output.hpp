@@ -1,4 +1,4 @@
-// What unflex wrote itself is no sliced print.
+// Recognises output of unflex itself, which is no sliced print.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,7 @@
 
 namespace unflex::run {
 
-// What is said where a sliced print is needed.
+// The error if a file is unflex's own output where a sliced print is needed.
 [[nodiscard]] Error compensated_already(const std::string& file, std::size_t line);
 
 // An error if the line is one of the comments that unflex marks its output with.

@@ -1,9 +1,9 @@
-// How far the nozzle is across the sliced path from where it should be, while filament is laid.
+// The nozzle's distance from where it should be, across the sliced path, while filament is laid.
 //
 //   path_error()           p* from the path; p* is the nozzle on the base as optimised
 //   add_emission_error()   p from p*; p is the nozzle on the lines as the printer replays them
 //
-// The second is what it costs to write the base's motion as few lines, on the printer's grid.
+// The second error is the cost of writing the base's motion as few lines, on the printer's grid.
 #pragma once
 
 #include <cstddef>

@@ -29,7 +29,7 @@ struct Piece {
   bool is_run = false;
   std::vector<gcode::Event> events;
   std::vector<std::size_t> move_counts;  // for each event, how many of `moves` it became
-  // For each event with moves, what the slicer says that it lays.
+  // For each event with moves, the kind of feature that it lays according to the slicer.
   std::vector<gcode::FeatureKind> features;
   std::vector<planner::PlannedMove> moves;
   emit::RunStart start;  // only for runs and parts
@@ -48,7 +48,7 @@ struct Piece {
   [[nodiscard]] bool ends_run() const { return is_run && after.empty(); }
 };
 
-// Why a move is kept whose line is not in a run.
+// The reason why a move is kept whose line is not in a run.
 [[nodiscard]] std::string_view kept_move_reason(const gcode::Segment& segment, Firmware firmware);
 
 // Counts the event's moves by the reason why they are kept, if they are.
@@ -63,12 +63,12 @@ class PieceReader {
 
   // The next piece; false at the end of the input. An error of kind input when the text cannot be
   // read, was written by unflex, has E in another mode than it says, ends without a single G-code
-  // command in it, or has a move without end. What the piece held before is gone; the storage of
-  // its lines is used again.
+  // command in it, or has a move without end. The former content of the piece is lost, and the
+  // storage of its lines is used again.
   [[nodiscard]] Result<bool> next(Piece& piece);
 
   [[nodiscard]] std::size_t bytes_read() const { return lines_.bytes_read(); }
-  // The one about moves that leave the travel comes once next() has returned false.
+  // The warning about moves that leave the travel comes once next() has returned false.
   [[nodiscard]] const std::vector<Diagnostic>& warnings() const { return warnings_; }
   [[nodiscard]] const planner::Limits& limits() const { return planner_->limits(); }
 

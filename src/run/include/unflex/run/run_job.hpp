@@ -24,8 +24,8 @@
 
 namespace unflex::run {
 
-// How far the work on a piece has come. A run goes through all of it, in this order. What is left
-// as sliced is lined at once, as there is nothing to work out.
+// The stages of the work on a piece. A run goes through all of them, in this order. A piece that
+// stays as sliced is lined at once, since there is nothing to work out.
 enum class Stage {
   read,
   timed,     // its timing is chosen, if that is free
@@ -34,7 +34,7 @@ enum class Stage {
   lined,     // the base is known and cut into lines, or why the run is kept
 };
 
-// How the solution of one axis of a window ended.
+// The outcome of solving one axis of a window.
 struct AxisResult {
   dynamics::AxisTrajectory base;
   int iterations = 0;
@@ -58,7 +58,7 @@ struct NewTiming {
   std::optional<dynamics::BaseTrajectory> base = {};
 };
 
-// How the search for the timing of a run goes, where that is free.
+// The search for the timing of a run whose timing is free.
 struct TimingSearch {
   std::vector<timing::MoveBounds> bounds;    // what each move may do; none: there is no search
   std::optional<timing::Extruder> extruder;  // only if the timing depends on it
@@ -87,13 +87,13 @@ struct Robustness {
 struct RunJob {
   Piece piece;
   std::atomic<Stage> stage = Stage::read;
-  // What follows is only used for runs and parts of runs.
+  // The members from here on are only used for runs and parts of runs.
   std::string failure;             // why the run is kept
   dynamics::NozzleXY nozzle;       // at its begin, if every run before is compensated
-  dynamics::NozzleXY first_stage;  // the same as a state of the setup's axes
+  dynamics::NozzleXY first_stage;  // `nozzle` as a state of the setup's axes
   compensate::Setup setup;
-  // Only if the timing is free: the setup if it stays as sliced all the same. Parts of a run have
-  // one setup, since they meet in motion.
+  // Only if the timing is free: the setup in case the timing stays as sliced all the same. Parts of
+  // a run have one setup, since they meet in motion.
   std::optional<compensate::Setup> sliced_setup;
   emit::RunAccel accel;
   TimingSearch search;
@@ -114,7 +114,7 @@ struct RunJob {
   std::size_t iterations = 0;
 
   [[nodiscard]] bool has_come_to(Stage at_least) const { return stage >= at_least; }
-  // What the nozzle is to follow.
+  // The course that the nozzle shall follow.
   [[nodiscard]] compensate::Course course() const {
     return {piece.before, reference(), piece.after};
   }
@@ -133,12 +133,12 @@ struct RunJob {
   [[nodiscard]] double shaping_s() const {
     return static_cast<double>(compensate::nodes_of_shaping(setup, grid.period_s)) * grid.period_s;
   }
-  // What the emitter is to write; the arguments are Run's.
+  // The run for the emitter. The arguments are members of emit::Run.
   [[nodiscard]] emit::Run run(double tolerance_share = 1.0, double limits_share = 1.0,
                               std::vector<double> lines_before_s = {}) const;
 };
 
-// How runs are worked on.
+// Rules by which runs are worked on.
 struct RunRules {
   compensate::Setup setup;
   compensate::Setup sliced_setup;  // for runs that keep their timing where it is free
@@ -160,17 +160,18 @@ struct TimingChoice {
   const compensate::Engine* engine = nullptr;  // for timing::faster()
 };
 
-// The timing as sliced, but for F.
+// Keeps the timing as sliced, but makes it slower where the nozzle, or the base in travel, would
+// run ahead of F.
 void keep_feed(RunJob& job, const compensate::Engine& engine);
 
 // Chooses the timing of the run, which is timed then. Throws nothing.
 void choose_timing(RunJob& job, const TimingChoice& choice) noexcept;
 
-// Stretches the timing of the run, which is `stretch` times as long then.
+// Stretches the timing of the run to RunJob::stretch times its duration.
 void stretch(RunJob& job);
 
-// Divides the run, in the timing that it has, into windows: it is laid out. Where its base is known
-// it has none.
+// Divides the run, in its present timing, into windows. The run is laid out then. A run whose base
+// is known has no windows.
 void lay_out(RunJob& job);
 
 // The job's nozzle, which swings with all the modes of the model, as a state of the axes that the

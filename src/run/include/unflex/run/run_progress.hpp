@@ -1,4 +1,4 @@
-// How far the work on a run is, so that a bar moves while a long one is computed.
+// The progress of the work on a run, so that a bar moves while a long run is computed.
 #pragma once
 
 #include <atomic>

@@ -1,5 +1,5 @@
-// What is tried with a run whose lines break a rule, one try after the other, before its sliced
-// lines must stand. Each try is a run by itself, which is worked out from its timing on.
+// Tries for a run whose lines break a rule, made one after the other, before its sliced lines must
+// stand. Each try is a run by itself, and is worked out from its timing on.
 #pragma once
 
 #include <cstddef>
@@ -38,7 +38,7 @@ class Tries {
 
  private:
   std::vector<Try> tries_;
-  std::size_t count_ = 0;  // that were given
+  std::size_t count_ = 0;  // number of tries given so far
   std::string objection_;
 };
 

@@ -26,7 +26,7 @@ class RunWriter {
   RunWriter(const RunRules& rules, std::string input_name, double max_lines_per_s,
             report::Report& report);
 
-  // What becomes of a piece: its text, or what is to be tried with the run first.
+  // The result for a piece: its text, or a try that has to be made with the run first.
   using Written = std::variant<std::string, Try>;
 
   // The piece must be lined. `tried` is the run of the try that was asked for last, lined, too. An
@@ -62,7 +62,7 @@ class RunWriter {
   std::optional<std::string> insist(const RunJob& job, std::string& text);
   std::optional<std::string> try_run(const RunJob& job, const emit::RunPlan& plan,
                                      bool may_be_worse, std::string& text);
-  // That the timing of the run is not the optimal one, or that it is the slicer's.
+  // Notes that the timing of the run is not the optimal one, or that it is the slicer's.
   void note_scaled(const RunJob& job, std::string reason);
   void note_slow(const RunJob& job, std::string reason);
   static void note_stretch(const RunJob& job, std::string reason, std::size_t& count,

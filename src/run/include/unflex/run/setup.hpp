@@ -1,4 +1,4 @@
-// With what the windows of a run are solved.
+// The setup with which the windows of a run are solved.
 #pragma once
 
 #include "unflex/compensate/run.hpp"
@@ -17,8 +17,8 @@ struct RunSetup {
   compensate::Setup setup;
   emit::RunAccel accel;
   double asked_accel_mm_s2 = 0.0;  // the largest that its plan asks of X or Y, rounded
-  // What the base may have so that no motor's speed changes too much from line to line; infinite
-  // where lines end on whole steps.
+  // The acceleration that the base may have so that no motor's speed changes too much from line to
+  // line. Infinite where lines end on whole steps.
   double accel_by_lines_mm_s2 = 0.0;
 };
 

@@ -1,5 +1,5 @@
-// Moves that leave the printer's travel, summed up in one warning: where a print was sliced for
-// another bed, thousands do.
+// Sums up the moves that leave the printer's travel in one warning, since a print that was sliced
+// for another bed has thousands of them.
 #pragma once
 
 #include <array>

@@ -60,12 +60,12 @@ inline constexpr int kPrintParts = 5;
 using Nozzle = Axes<dynamics::FlexibleAxis>;
 
 struct BenchSetup {
-  // The acceleration limits of both are set per method.
+  // The acceleration limits of `unflex` and `unflex_band` are set per method.
   compensate::Setup unflex;
   compensate::Setup unflex_band;    // of unflex_band_4x
   std::optional<Nozzle> two_stage;  // the axes with what rings behind them, if anything does
-  // The methods of unflex allow multiples of it. thesis_least_squares has its limit of jerk from
-  // it.
+  // The methods of unflex allow multiples of this acceleration. thesis_least_squares derives its
+  // limit of jerk from it.
   double plan_accel_mm_s2 = 5000.0;
   double thesis_period_s = 5e-3;
   int parts = 10;             // parabolas per node interval of unflex' base

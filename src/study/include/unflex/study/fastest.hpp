@@ -95,7 +95,7 @@ struct FastestOutcome {
 using Stretch = std::vector<gcode::Segment>;
 using StretchPlan = std::vector<planner::PlannedMove>;
 
-// The print, as it is planned anew for each point of the grid.
+// The path of the print, which is planned anew for each point of the grid.
 struct PrintPath {
   std::vector<Stretch> stretches;
   double dwell_s = 0.0;            // pauses between them
@@ -115,12 +115,12 @@ struct Candidate {
   double time_s = 0.0;
 };
 
-// The errors with these limits. nullopt, as soon as that is certain, if they break the tolerance.
+// The errors with these limits. nullopt as soon as it is certain that they break the tolerance.
 using Measure =
     std::function<std::optional<PathErrors>(const PlanLimits& limits, double tolerance_mm)>;
 
 // The fastest candidate that keeps each tolerance. No candidate is measured twice, and none after
-// all tolerances have theirs.
+// every tolerance has its candidate.
 [[nodiscard]] std::vector<std::optional<TimedMotion>> fastest(
     std::vector<Candidate> candidates, const std::vector<double>& tolerances_mm,
     const ToleranceRule& rule, const Measure& measure);
@@ -132,8 +132,8 @@ using Measure =
                                                    const std::vector<StretchPlan>& as_sliced,
                                                    const FastestSetup& setup, Progress& progress);
 
-// The time if each move had its F throughout: no timing that keeps F takes less. Pauses count, and
-// moves of filament alone as planned.
+// The print's time if each move ran at its F throughout. No timing that keeps F takes less. Pauses
+// count. Moves of filament alone count as planned.
 [[nodiscard]] double time_at_feed_s(const PrintPath& path,
                                     const std::vector<StretchPlan>& as_sliced);
 

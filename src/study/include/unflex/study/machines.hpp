@@ -33,8 +33,8 @@ enum class Contender { uncompensated, zv, mzv, ei, recommended, unflex };
 inline constexpr std::size_t kContenderCount = 6;
 [[nodiscard]] std::string_view name(Contender contender);
 
-// A machine is not tomorrow what its record tells: a spool, a part that grows and another test
-// shift all its frequencies. So each is measured with all frequencies of its truth off by these
+// By tomorrow a machine differs from its record: a spool, a part that grows and another test shift
+// all its frequencies. So each machine is measured with all frequencies of its truth off by these
 // shares.
 inline constexpr std::array<double, 3> kMachineShifts = {-0.07, 0.0, 0.07};
 inline constexpr std::size_t kNoShift = 1;

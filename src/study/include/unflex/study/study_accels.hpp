@@ -10,8 +10,8 @@
 
 namespace unflex::study {
 
-// Compensates and verifies `job.input` with each of these as limits.max_accel_mm_s2. scale: what
-// the print sets of acceleration is multiplied by the same ratio. What is written stays in memory.
+// Compensates and verifies `job.input` with each of these as limits.max_accel_mm_s2. scale:
+// multiplies the accelerations that the print sets by the same ratio. The output stays in memory.
 // Forks its workers first: call it before any thread exists.
 [[nodiscard]] Result<study::AccelsOutcome> study_accels(const flow::Job& job,
                                                         const std::vector<double>& accels_mm_s2,

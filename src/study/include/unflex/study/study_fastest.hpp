@@ -10,8 +10,8 @@
 
 namespace unflex::study {
 
-// The settings as the study takes them: unflex is made for the exact frequencies, unless they say
-// how far these may be off.
+// The settings for the study. unflex is made for the exact frequencies, unless the settings say how
+// far these may be off.
 [[nodiscard]] machine::Settings settings_of_fastest(machine::Settings settings);
 
 // Searches the least print time of `job.input` for each tolerance, on the nozzle of the job's

@@ -15,7 +15,7 @@ namespace unflex::temperature {
 // The hotend of the settings, if they have a model.
 [[nodiscard]] std::optional<hotend::Plant> hotend_plant(const machine::HotendSettings& settings);
 
-// What may become of the output.
+// Whether the output may change.
 enum class OutputMay {
   stay,    // it is only looked at
   change,  // changes of temperature may be put ahead

@@ -1,5 +1,5 @@
-// As fast as a tolerance of the nozzle allows: the timing of a run chosen anew, along the path as
-// it was sliced.
+// Chooses the timing of a run anew, along the path as it was sliced. The motion becomes as fast as
+// a tolerance of the nozzle allows.
 //
 //   F   the slicer's feed, which stays        e   contour error of the nozzle
 //
@@ -26,11 +26,11 @@
 
 namespace unflex::timing {
 
-// What a move may do, along its path.
+// Bounds of a move, along its path.
 struct MoveBounds {
   double speed_mm_s = std::numeric_limits<double>::infinity();
   double accel_mm_s2 = std::numeric_limits<double>::infinity();
-  // Where it begins and ends.
+  // Largest speeds at the move's beginning and end.
   double start_speed_mm_s = std::numeric_limits<double>::infinity();
   double end_speed_mm_s = std::numeric_limits<double>::infinity();
   // Largest speed of the nozzle, if that is lower than F; in travel that of the base, too.
@@ -43,15 +43,15 @@ struct MoveBounds {
 // Largest e of travel: it should not leave the way that the slicer has found between walls.
 inline constexpr double kTravelTolerance_mm = 0.2;
 
-// What feeds the nozzle, and how evenly it is to lay.
+// The extruder that feeds the nozzle, and how evenly it shall lay.
 struct Extruder {
   dynamics::HotendPressure hotend;
   double max_accel_mm_s2 = 0.0;  // of filament
   double width_tolerance = 0.0;  // a share of the width
 };
 
-// What the firmware's limits of axes let a move do, those of acceleration in X and Y and of corners
-// aside. limits: those of the printer, not of the print.
+// The bounds that the firmware's limits of axes set to a move. Limits of acceleration in X and Y
+// and of corners are left out. limits: the printer's limits, not the print's.
 [[nodiscard]] MoveBounds bounds_by_axes(const planner::PlannedMove& move,
                                         const planner::Limits& limits,
                                         const planner::FirmwareConfig& config);
@@ -63,17 +63,17 @@ using Plants = Axes<std::vector<compensate::Plant>>;
 struct Timed {
   std::vector<planner::PlannedMove> moves;  // each move in one piece or several
   std::vector<std::size_t> pieces;          // how many, for each move of the path
-  // The base that goes with it, on compensate::node_grid(); unset: to be solved for.
+  // The base for this timing, on compensate::node_grid(). Unset: it is still to be solved for.
   std::optional<dynamics::BaseTrajectory> base = {};
-  // What the base is to suit besides the axes as given; unset: as in the setup.
+  // Models that the base shall suit besides the axes as given. Unset: the setup's plants.
   std::optional<Plants> plants = {};
 };
 
-// The moves of the course in less time, within the bounds, of which there is one for each move. A
-// part of a longer run keeps its timing where it meets its neighbours. Where the axes may be
-// several things and the nozzle of one strays further as sliced, it may stray as far. Where the
-// extruder cannot lay evenly as sliced, the time may become longer. nullopt: no such timing was
-// found.
+// The moves of the course in less time. Each move keeps its own entry of `bounds`. A part of a
+// longer run keeps its timing where it meets its neighbours. If the nozzle of one of several models
+// strays further than its tolerance in the timing as sliced, it may stray as far in the new timing.
+// If the extruder cannot lay evenly in the timing as sliced, the new timing may be slower. nullopt:
+// no such timing was found.
 [[nodiscard]] std::optional<Timed> faster(const compensate::Course& course,
                                           const compensate::Setup& setup,
                                           const dynamics::NozzleXY& nozzle,
@@ -89,9 +89,9 @@ struct Timed {
                                                std::span<const MoveBounds> bounds,
                                                const compensate::Engine& engine);
 
-// As faster(), by a program in which path and time are found together; the base comes with it. For
-// whole runs of axes with one mode, or of such in a band of frequencies. The error tells why there
-// is no such timing.
+// As faster(), by a program in which path and time are found together; the base comes with it. It
+// takes whole runs only, and axes with one mode, whose frequencies may be in a band. The error
+// tells why there is no such timing.
 [[nodiscard]] tl::expected<Timed, std::string> optimal(
     const compensate::Course& course, const compensate::Setup& setup,
     const dynamics::NozzleXY& nozzle, std::span<const MoveBounds> bounds,

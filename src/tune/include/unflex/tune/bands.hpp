@@ -15,20 +15,21 @@
 namespace unflex::tune {
 
 // A band as it was sliced and as it was compensated, each a whole file, with the tower's start code
-// and its foot. Below the first band lies the tower's base; the others begin where they will.
+// and its foot. The first band's file also holds the tower's base. The other files go straight to
+// where their band begins.
 struct Band {
   machine::Settings made_for;
   std::string sliced;
   std::string compensated;
 };
 
-// What each band is compensated with: the values that its number has in the trials, by the exact
-// design of one mode for each axis, since a base that suits several models hides what is looked
-// for. Whatever else `settings` say holds.
+// The settings that each band is compensated with: its values in the trials, by the exact design of
+// one mode for each axis. A base that suits several models would hide the waves. All else in
+// `settings` holds.
 [[nodiscard]] std::vector<machine::Settings> settings_of_bands(const tune::TowerSettings& tower,
                                                                const machine::Settings& settings);
-// What each band is compensated with for a hotend whose pressure is linear. It is written on all
-// firmwares.
+// The settings that each band is compensated with, for a hotend whose pressure is linear. Pressure
+// is written into the runs on all firmwares.
 [[nodiscard]] std::vector<machine::Settings> settings_of_bands(
     const tune::PressureTowerSettings& tower, const machine::Settings& settings);
 
@@ -57,8 +58,8 @@ struct Relief {
   [[nodiscard]] double height_um() const;
 };
 
-// What a printer with these axes makes of the bands: for each band the relief of each of the
-// tower's walls, by a simulation of the compensated file's replay.
+// The walls that a printer with these axes makes of the bands: for each band the relief of each of
+// the tower's walls. It simulates the compensated file's replay.
 [[nodiscard]] Result<std::vector<std::vector<Relief>>> print_bands(const std::vector<Band>& bands,
                                                                    const tune::Tower& tower,
                                                                    const TrueAxes& axes,
@@ -76,13 +77,13 @@ struct RingWidths {
   static constexpr double kBin_mm = 0.4;
   std::vector<double> errors;
 
-  // What an eye sees: the largest mean of neighbouring bins, without its sign.
+  // The error that an eye sees: the largest mean of neighbouring bins, without its sign.
   static constexpr std::size_t kBinsSeen = 2;
   [[nodiscard]] double seen() const;
 };
 
-// What a printer with this hotend makes of the bands, by a simulation of the compensated file's
-// replay. Its axes are those that the bands are made for.
+// The widths that a printer with this hotend makes of the bands. It simulates the compensated
+// file's replay. The printer's axes are those that the bands are made for.
 [[nodiscard]] Result<std::vector<RingWidths>> print_bands(const std::vector<Band>& bands,
                                                           const TrueHotend& hotend,
                                                           Progress& progress);

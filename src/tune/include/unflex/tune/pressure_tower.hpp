@@ -19,13 +19,13 @@ namespace unflex::tune {
 
 struct PressureTowerSettings : TowerPrinter {
   PressureTrial trial;
-  double own_advance_s = 0.0;  // the printer's own, which it has back behind the tower
+  double own_advance_s = 0.0;  // the printer's own, which is set again behind the tower
   std::optional<double> max_flow_mm3_s = {};  // what the hotend melts
 };
 
-// The most that a tower of this trial may accelerate, mm/s², if the extruder accelerates filament
-// by no more than `extruder_mm_s2`: where the speed begins to change, it has to come up to K q̇ at
-// once.
+// The largest acceleration of a tower of this trial, mm/s², if the extruder accelerates filament by
+// no more than `extruder_mm_s2`. Where the speed begins to change, the extruder has to come up to K
+// q̇ at once.
 [[nodiscard]] double followed_accel_mm_s2(const PressureTowerSettings& settings,
                                           double extruder_mm_s2);
 
@@ -44,7 +44,8 @@ struct PressureWall {
 // Whether the file of a tower says that it is of this kind.
 [[nodiscard]] bool is_pressure_tower(const std::string& text);
 
-// What the file of such a tower says of itself. Errors are of kind input: the file is none.
+// The facts that the file of such a tower tells. An error of kind input if the file is no such
+// tower.
 struct PressureTowerRecord {
   PressureTrial trial;
   Codes codes;

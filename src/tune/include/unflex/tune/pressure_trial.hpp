@@ -10,8 +10,8 @@
 //                                                           + (δ' − δ) K p² q/(1 + K p)
 //
 // p being the derivative by time. So an error of s adds or takes filament, (s' − s) Δq in total for
-// a change Δq of the flow; with s right, an error of δ only shifts some, there and back. Towers
-// therefore try s and δ, not K and δ: what one of them is does not matter much to the other. They
+// a change Δq of the flow. With s right, an error of δ only shifts some filament, there and back.
+// Towers therefore try s and δ, not K and δ: an error of one hardly disturbs the other. The rounds
 // alternate: s, s in finer steps, δ, s, δ, ….
 #pragma once
 
@@ -24,7 +24,7 @@
 
 namespace unflex::tune {
 
-// What is known of a hotend, and how far it may be off either way.
+// The knowledge of a hotend, and how far it may be off either way.
 struct PressureKnowledge {
   double sum_s = 0.0;  // s; 0: nothing is known
   double sum_error_s = 0.0;
@@ -38,8 +38,8 @@ struct PressureKnowledge {
 
 enum class PressureParameter { sum, dead_time };
 
-// What one tower tries: band n of 1 … bands has the value first · stepⁿ⁻¹ where nothing is known,
-// and else first + (n − 1) · step.
+// The values that one tower tries. Band n of 1 … bands has the value first · stepⁿ⁻¹ where nothing
+// is known, otherwise first + (n − 1) · step.
 struct PressureTrial {
   PressureParameter parameter = PressureParameter::sum;
   std::size_t bands = 0;
@@ -48,20 +48,22 @@ struct PressureTrial {
   PressureKnowledge known = {};  // before this tower
 
   [[nodiscard]] double value_s(std::size_t band) const;
-  // What a band is made for.
+  // The values that a band is made for.
   [[nodiscard]] double advance_s(std::size_t band) const;
   [[nodiscard]] double dead_time_s(std::size_t band) const;
 };
 
-// What to try next.
+// The trial of the next tower.
 [[nodiscard]] PressureTrial next_trial(const PressureKnowledge& known);
 
-// What the zone of even walls tells. If it reaches an end of the bands, the true value may lie
-// beyond, and the error says so. Errors are of kind usage: the trial has no such bands.
+// The knowledge that follows from the zone of even walls. If the zone reaches an end of the bands,
+// the true value may lie beyond, and the known error is widened for this. Errors are of kind usage:
+// the trial has no such bands.
 [[nodiscard]] Result<PressureKnowledge> read(const PressureTrial& trial, const Zone& zone);
 
-// A trial as a line of comment in the tower's G-code, without its end, and back. pressure_trial():
-// an error of kind input if the line begins like one but is none; `place` is the line's.
+// Writes a trial as a line of comment in the tower's G-code, without its end, and reads it back.
+// pressure_trial(): an error of kind input if the line begins like a trial but is none; `place` is
+// the line's.
 inline constexpr std::string_view kPressureMark = "; unflex tune: pressure";
 [[nodiscard]] std::string to_comment(const PressureTrial& trial);
 [[nodiscard]] Result<PressureTrial> pressure_trial(std::string_view line, const SourcePlace& place);

@@ -69,7 +69,8 @@ struct Tower {
   std::string base;                // brim and base
   std::vector<std::string> bands;  // each from standstill to standstill, at the same place
   std::string foot;                // from the last band on
-  // Moves to where a band begins, number 1 … . Behind `start` this stands in for what lies below.
+  // Moves to the beginning of a band, number 1 … . Behind `start` these moves stand in for the
+  // tower below the band.
   [[nodiscard]] std::string approach(std::size_t number) const;
   std::vector<double> bottoms_mm;  // height at which each band begins
   std::vector<Wall> walls;         // of a tower for axes: the right one and the bottom one
@@ -85,21 +86,23 @@ struct Tower {
 // The tower as a slicer would write it, not compensated.
 [[nodiscard]] Tower tower(const TowerSettings& settings);
 
-// What the file of a tower says of itself: enough to read it and to make the next. Errors are of
-// kind input: the file is none.
+// The facts that the file of a tower tells: enough to read it and to make the next tower. An error
+// of kind input if the file is no tower.
 struct TowerRecord {
   Axes<Trial> trials;
   Codes codes;
 };
 [[nodiscard]] Result<TowerRecord> record_of(const std::string& text, const std::string& name);
 
-// The start code and the end code of a sliced print: what stands before its first layer, and what
-// stands behind its last move that lays filament, without moves, since those are of another height.
-// The center is that of what it lays. An error of kind input if it lays no filament.
+// The start code and the end code of a sliced print. The start code stands before the first layer.
+// The end code stands behind the last move that lays filament. Its moves are left out, since they
+// are for another height. The center is that of the laid filament. An error of kind input if the
+// print lays none.
 [[nodiscard]] Result<Codes> codes_of(const std::string& print, const std::string& name,
                                      Firmware firmware);
 
-// The codes of a printer of which only temperatures are known. bed_temp_c: 0 if it is not heated.
+// The codes for a printer of which only temperatures are known. bed_temp_c: 0 if the bed is not
+// heated.
 [[nodiscard]] Codes plain_codes(double nozzle_temp_c, double bed_temp_c);
 
 }  // namespace unflex::tune

@@ -7,8 +7,8 @@
 //
 // A base made for other values than the axis has leaves waves of the height 100 k √(δ² + Δζ²),
 // since its transfer function is 2(δ + iΔζ) instead of 0 at the axis' pole. So the zone without
-// waves lies around the true value, whatever the other value is, if only that is not too far off.
-// The rounds therefore alternate: frequency, damping ratio, frequency, ….
+// waves lies around the true value, even if the other value is somewhat off. The rounds therefore
+// alternate: frequency, damping ratio, frequency, ….
 #pragma once
 
 #include <cstddef>
@@ -19,7 +19,7 @@
 
 namespace unflex::tune {
 
-// What is known of an axis, and how far it may be off either way.
+// The knowledge of an axis, and how far it may be off either way.
 struct Knowledge {
   double freq_hz = 0.0;     // 0: nothing is known
   double freq_error = 0.0;  // share
@@ -43,8 +43,8 @@ struct Waves {
   [[nodiscard]] double height_mm() const;
 };
 
-// What one tower tries for one axis: band n of 1 … bands has the value first · stepⁿ⁻¹ for a
-// frequency and first + (n − 1) · step for a damping ratio.
+// The values that one tower tries for one axis. Band n of 1 … bands has the value first · stepⁿ⁻¹
+// for a frequency and first + (n − 1) · step for a damping ratio.
 struct Trial {
   Parameter parameter = Parameter::freq_hz;
   std::size_t bands = 0;
@@ -54,7 +54,7 @@ struct Trial {
   Waves waves = {};
 
   [[nodiscard]] double value(std::size_t band) const;
-  // What a band is compensated for.
+  // The values that a band is compensated for.
   [[nodiscard]] double freq_hz(std::size_t band) const;
   [[nodiscard]] double damping_ratio(std::size_t band) const;
 };
@@ -65,19 +65,21 @@ struct Zone {
   std::size_t last = 0;
 };
 
-// What to try next for an axis whose print accelerates by as much.
+// The next trial for an axis whose print accelerates by accel_mm_s2.
 [[nodiscard]] Trial next_trial(const Knowledge& known, double accel_mm_s2);
 
-// The acceleration of the print with which the trial's walls can be read: below it, bands that are
-// far off show no waves either. 0 if the one that the trial is made for is enough.
+// The acceleration of the print at which the trial's walls can be read. Below it, bands that are
+// far off show no waves either. 0 if the trial's own acceleration is enough.
 [[nodiscard]] double needed_accel_mm_s2(const Trial& trial, double accel_mm_s2);
 
-// What the zone tells. If it reaches an end of the bands, the true value may lie beyond, and the
-// error says so. Errors are of kind usage: the trial has no such bands.
+// The knowledge that follows from the zone. If the zone reaches an end of the bands, the true value
+// may lie beyond, and the known error is widened for this. Errors are of kind usage: the trial has
+// no such bands.
 [[nodiscard]] Result<Knowledge> read(const Trial& trial, const Zone& zone);
 
-// A trial as a line of comment in the tower's G-code, without its end, and back. from_comment():
-// an error of kind input if the line begins like one but is none; `place` is the line's.
+// Writes a trial as a line of comment in the tower's G-code, without its end, and reads it back.
+// from_comment(): an error of kind input if the line begins like a trial but is none; `place` is
+// the line's.
 inline constexpr std::string_view kTrialMark = "; unflex tune: axis=";
 [[nodiscard]] std::string to_comment(char axis, const Trial& trial);
 struct AxisTrial {

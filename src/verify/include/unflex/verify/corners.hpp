@@ -41,8 +41,8 @@ class CornerGauge {
   // The next move of the path, and when the reference passes it. Moves come in their order, each
   // before the nozzle is within reach of its end.
   void follow(const planner::PlannedMove& move, double start_s, double end_s);
-  // The nozzle is here at time_s. It has come straight from the last place, so samples must be
-  // close. Times must not decrease.
+  // The nozzle is here at time_s. It has come straight from its last place, so samples must be
+  // close together. Times must not decrease.
   void sample(double time_s, const XY& place_mm) {
     // A verification comes here at every step, mostly with no corner within reach.
     if (time_s < next_s_) {
@@ -51,8 +51,8 @@ class CornerGauge {
       look(time_s, place_mm);
     }
   }
-  // Nobody looks at this time. What is within reach now counts for nothing, since the nozzle may
-  // pass it unseen.
+  // Nobody looks at the nozzle at this time. Corners within reach now do not count, since the
+  // nozzle may pass them unseen.
   void miss(double time_s);
   // Whether a corner is within reach.
   [[nodiscard]] bool is_near(double time_s) const { return time_s >= next_s_; }
@@ -76,10 +76,10 @@ class CornerGauge {
   void find_next();
 
   double reach_s_;
-  // By their times. If open_, the last one is the end of the last move, of which only the next one
-  // tells whether it is a corner.
+  // Corners by their times. If open_, the last one is the end of the last move. Only the next move
+  // tells whether that end is a corner.
   std::deque<Corner> corners_;
-  // From when on the first of them counts; infinity if there is none.
+  // The time from which the first corner counts; infinity if there is none.
   double next_s_ = std::numeric_limits<double>::infinity();
   bool open_ = false;
   gcode::Position end_mm_{};  // where the last move in X and Y has ended, and its direction

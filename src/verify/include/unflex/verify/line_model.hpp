@@ -6,8 +6,8 @@
 namespace unflex::verify {
 
 struct LineModel {
-  // An advance of 0 is what the sliced file or the printer has set; if that is 0 as well, it is not
-  // known, and no line is measured.
+  // An advance of 0 stands for the one that the sliced file or the printer has set. If that is 0 as
+  // well, the advance is not known, and no line is measured.
   dynamics::HotendPressure hotend;
   // Compensated runs set pressure advance, or do without the printer's.
   bool is_written = true;

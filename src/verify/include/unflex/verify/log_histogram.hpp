@@ -22,8 +22,8 @@ class LogHistogram {
     weights_[static_cast<std::size_t>(std::min(cell, kCells - 1))] += weight;
   }
 
-  // Where the given fraction of the whole weight is reached, within 1 %. The weight of a cell
-  // counts as even all over it. 0 for an empty histogram.
+  // The value at which the given fraction of the whole weight is reached, within 1 %. The weight of
+  // a cell counts as spread evenly over it. 0 for an empty histogram.
   [[nodiscard]] double quantile(double fraction) const;
   // Total weight of the cells that begin below the value.
   [[nodiscard]] double weight_below(double value) const;

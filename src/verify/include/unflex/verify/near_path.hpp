@@ -48,9 +48,9 @@ class NearPath {
   [[nodiscard]] const Span* spans() const { return spans_.data() + dropped_; }
   [[nodiscard]] std::size_t span_count() const { return end_ - first_; }
   [[nodiscard]] std::size_t first() const { return first_; }
-  // Whether the first span begins before t − τ, and the last ends after t + τ. Then they count from
-  // begin_mm() and to end_mm() on. These take long to find. Who is behind begin_bound_mm() and
-  // before end_bound_mm() need not ask.
+  // Whether the first span begins before t − τ, and whether the last ends after t + τ. Such spans
+  // count only from begin_mm() on and up to end_mm(). These two take long to find. They are not
+  // needed for a place behind begin_bound_mm() and before end_bound_mm().
   [[nodiscard]] bool begins_cut() const { return spans()->start_s < time_s_ - reach_s_; }
   [[nodiscard]] bool ends_cut() const {
     return spans()[span_count() - 1].end_s > time_s_ + reach_s_;
@@ -83,7 +83,7 @@ class NearPath {
 
   std::size_t first_ = 0;  // pieces that reach into [t − τ, t + τ]
   std::size_t end_ = 0;
-  // Those pieces, from dropped_ on. What the path has of them lies far apart in memory.
+  // The pieces within reach, from dropped_ on. In the path their data lie far apart in memory.
   std::vector<Span> spans_;
   std::size_t dropped_ = 0;
   Cut first_cut_;

@@ -34,9 +34,9 @@ struct NozzleStep {
   dynamics::BaseXY base;
   // Whether the base's motion lays filament.
   bool extruding = false;
-  // Distance from the path, and the line of the sliced file that is nearest to the nozzle: the
-  // square of the distance, its mean during the step, and the largest that it was during the step
-  // or just before. Set while the reference moves or filament is laid.
+  // The square of the distance from the path, its mean during the step, and its largest value
+  // during the step or just before. Then the line of the sliced file that is nearest to the nozzle.
+  // Set while the reference moves or filament is laid.
   double contour2_mm2 = 0.0;
   double mean_contour2_mm2 = 0.0;
   double largest_contour2_mm2 = 0.0;
@@ -77,8 +77,8 @@ class Observer {
   virtual void advanced(const ReferencePath& sliced, double time_s) = 0;
   // For how long a piece of the sliced path is still needed after its time, s.
   [[nodiscard]] virtual double memory_s() const = 0;
-  // Whether it asks what the sliced file would do without the printer's own shaper if the
-  // frequencies were others.
+  // Whether the observer asks for the sliced file without the printer's own shaper at other
+  // frequencies.
   [[nodiscard]] virtual bool asks_for_unshaped() const = 0;
 
  protected:

@@ -16,7 +16,7 @@ namespace unflex::verify {
 // A move of this duration that stands still.
 [[nodiscard]] planner::PlannedMove resting(const XY& place_mm, double duration_s);
 
-// When the reference has covered how much of a move.
+// The time at which the reference has covered this length of a move.
 struct Passage {
   double time_s = 0.0;      // since the move began
   double covered_mm = 0.0;  // of its length
@@ -25,8 +25,8 @@ struct Passage {
 // A move of the path, and the timing in which the reference passes it.
 struct ReferenceMove {
   planner::PlannedMove move;
-  // From the move's beginning to its end, at even speed between two passages. Empty: as the move
-  // itself has it.
+  // The timing from the move's beginning to its end, at even speed between two passages. Empty: the
+  // move's own timing.
   std::vector<Passage> timing;
 
   [[nodiscard]] double duration_s() const {

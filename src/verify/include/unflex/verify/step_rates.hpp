@@ -28,7 +28,7 @@ struct StepRules {
   std::array<double, kStepMotors> steps_per_mm{};  // 0: not known, the motor is not counted
   double max_hz = std::numeric_limits<double>::infinity();        // of each motor
   double max_total_hz = std::numeric_limits<double>::infinity();  // of all motors together
-  // As max_total_hz, only while more than one motor moves.
+  // A limit like max_total_hz that holds only while more than one motor moves.
   double max_shared_hz = std::numeric_limits<double>::infinity();
 
   [[nodiscard]] bool is_known() const;
@@ -49,7 +49,7 @@ struct StepRates {
   StepRate shared;  // the same, only while more than one motor moves
 };
 
-// A limit that the rates are above.
+// A limit that the rates exceed.
 struct StepBreach {
   std::size_t line = 0;
   std::string message;

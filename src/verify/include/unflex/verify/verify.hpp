@@ -31,15 +31,15 @@ struct TravelRange {
 };
 using TravelLimits = Axes<TravelRange>;
 
-// How far the nozzle may stray in a compensated run: `times` as far as if the run had been kept, or
-// as far as the absolute limit, whichever is more. The small margins cover the different sampling
-// of the two.
+// How far the nozzle may stray in a compensated run: `times` as far as in the run with its sliced
+// moves kept, or as far as the absolute limit, whichever is more. The small margins cover the
+// different sampling of the two runs.
 struct Leeway {
   double times = 1.02;
   double rms_mm = 0.5e-3;
   double max_mm = 3e-3;
-  // A distance that is allowed besides where the firmware rounds to steps, since a single place may
-  // be off by chance.
+  // An additional distance where the firmware rounds to steps, since a single place may be off by
+  // chance.
   double chance_mm = 0.0;
 };
 
@@ -54,7 +54,8 @@ struct Rules {
   std::vector<NozzleModel> plants;  // what else the axes may be
   TravelLimits travel;
   double base_max_velocity_mm_s = 600.0;
-  // A run's motors may accelerate that much, and that many times as much as its plan does.
+  // Limits of the acceleration of a run's motors: a fixed one, and one as a multiple of the plan's
+  // acceleration. The larger limit counts.
   double base_max_accel_mm_s2 = 20000.0;
   double base_accel_times_plan = 0.0;
   double max_lines_per_s = std::numeric_limits<double>::infinity();
@@ -95,20 +96,21 @@ struct BlamedRun {
 // duration. The other figures are 0.
 struct Detuned {
   Deviation uncompensated;
-  // As Measured::unshaped. Only if an observer asks for it.
+  // The nozzle of Measured::unshaped. Set only if an observer asks for it.
   std::optional<Deviation> unshaped;
   Deviation compensated;
 };
 
-// A place where the output asks for more flow than Rules::max_flow_mm3_s and than the sliced file
-// does in the same section, by more than 1 % each.
+// A place where the output's flow exceeds Rules::max_flow_mm3_s and the sliced file's flow in the
+// same section, by more than 1 % each.
 struct TooMuchFlow {
   double flow_mm3_s = 0.0;
   double sliced_mm3_s = 0.0;
   std::size_t line = 0;  // of the output
 };
 
-// A line of the output that tells how long the print takes, and how long it takes up to there.
+// A line of the output that tells how long the print takes, and the time of the print up to the
+// line.
 struct TimeNote {
   std::size_t line = 0;
   double reference_s = 0.0;
@@ -142,13 +144,12 @@ struct VerifyReport {
 // error but a report with violations: a line lost, changed or moved; filament not conserved; a
 // position outside the travel (and further out than the input itself goes); base velocity or
 // acceleration above its limit (by more than 0.1 % and than the rounding of coordinates explains);
-// more steps per second in a compensated run than its motors may make;
-// more lines per second than the budget and than the sliced file has there; a base further from
-// the path than the machine bends; filament laid after the plan of a run has ended; a nozzle that
-// strays more than in the sliced file; a move the firmware refuses (extrusion ratio); limits, modes
-// or shaper not restored. If the sequence of stops differs, nothing can be compared any further.
-// The figures then cover what came before. Nothing but VerifyReport::detuned depends on the
-// observation.
+// more steps per second in a compensated run than its motors may make; more lines per second than
+// the budget and than the sliced file has there; a base further from the path than the machine
+// bends; filament laid after the plan of a run has ended; a nozzle that strays more than in the
+// sliced file; a move the firmware refuses (extrusion ratio); limits, modes or shaper not restored.
+// If the sequence of stops differs, nothing can be compared any further. The figures then cover the
+// part before. Nothing but VerifyReport::detuned depends on the observation.
 [[nodiscard]] Result<VerifyReport> verify(std::istream& input, const std::string& input_name,
                                           std::istream& output, const std::string& output_name,
                                           const Rules& rules, Progress& progress,
