@@ -154,10 +154,11 @@ void FlatForm::assign(const ScaledWindow& scaled) {
   for (Padded* values : {&c_, &step_, &gradient_, &scratch_}) {
     values->resize(unknowns);
   }
-  for (Padded* values : {&node_reference_, &node_weight_, &node_pull_}) {
+  for (Padded* values : {&at_nodes_.reference, &at_nodes_.weight, &at_nodes_.pull}) {
     values->resize(nodes_);
   }
-  for (Padded* values : {&middle_reference_, &middle_weight_, &middle_pull_, &jerk_pull_}) {
+  for (Padded* values :
+       {&at_middles_.reference, &at_middles_.weight, &at_middles_.pull, &jerk_pull_}) {
     values->resize(nodes_ - 1);
   }
   for (std::size_t d = 0; d <= kHalfBand; ++d) {
@@ -165,10 +166,10 @@ void FlatForm::assign(const ScaledWindow& scaled) {
   }
   for (std::size_t k = 0; k < nodes_; ++k) {
     const bool at_end = k == 0 || k + 1 == nodes_;
-    node_weight_[k] = window.weight[2 * k] * (at_end ? 1.0 / 6.0 : 1.0 / 3.0);
+    at_nodes_.weight[k] = window.weight[2 * k] * (at_end ? 1.0 / 6.0 : 1.0 / 3.0);
   }
   for (std::size_t k = 0; k + 1 < nodes_; ++k) {
-    middle_weight_[k] = window.weight[2 * k + 1] * (2.0 / 3.0);
+    at_middles_.weight[k] = window.weight[2 * k + 1] * (2.0 / 3.0);
   }
   set_aims();
   add_up_cost();
@@ -182,10 +183,10 @@ void FlatForm::assign(const ScaledWindow& scaled) {
 
 void FlatForm::set_aims() {
   for (std::size_t k = 0; k < nodes_; ++k) {
-    node_reference_[k] = window_->aim(0)[2 * k];
+    at_nodes_.reference[k] = window_->aim(0)[2 * k];
   }
   for (std::size_t k = 0; k + 1 < nodes_; ++k) {
-    middle_reference_[k] = window_->aim(0)[2 * k + 1];
+    at_middles_.reference[k] = window_->aim(0)[2 * k + 1];
   }
 }
 
@@ -248,8 +249,8 @@ void FlatForm::add_up_cost() {
       diagonal[r] = window_->jerk_weight * part;
     }
   }
-  loops::add_squares<kHalfBand>(nozzle_, node_weight_.data(), cost_hessian_, unknowns);
-  loops::add_squares<kHalfBand + 1>(middle_, middle_weight_.data(), cost_hessian_, unknowns);
+  loops::add_squares<kHalfBand>(nozzle_, at_nodes_.weight.data(), cost_hessian_, unknowns);
+  loops::add_squares<kHalfBand + 1>(middle_, at_middles_.weight.data(), cost_hessian_, unknowns);
 }
 
 void FlatForm::evaluate(const PerKind<bool>& kinds) {
@@ -259,10 +260,10 @@ void FlatForm::evaluate(const PerKind<bool>& kinds) {
     as_array(result) = as_array(weight) * error;
   };
   half_cost_ = 0.0;
-  loops::apply<kHalfBand>(nozzle_, c_.data(), node_pull_.data(), nodes_);
-  pull(node_reference_, node_weight_, node_pull_);
-  loops::apply<kHalfBand + 1>(middle_, c_.data(), middle_pull_.data(), nodes_ - 1);
-  pull(middle_reference_, middle_weight_, middle_pull_);
+  loops::apply<kHalfBand>(nozzle_, c_.data(), at_nodes_.pull.data(), nodes_);
+  pull(at_nodes_.reference, at_nodes_.weight, at_nodes_.pull);
+  loops::apply<kHalfBand + 1>(middle_, c_.data(), at_middles_.pull.data(), nodes_ - 1);
+  pull(at_middles_.reference, at_middles_.weight, at_middles_.pull);
   const Stencil& jerk = stencils_[index_of(RowKind::jerk)];
   apply(RowKind::jerk, jerk, c_, jerk_pull_);
   half_cost_ += 0.5 * window_->jerk_weight * as_array(jerk_pull_).square().sum();
@@ -270,8 +271,9 @@ void FlatForm::evaluate(const PerKind<bool>& kinds) {
 
   as_array(gradient_).setZero();
   const std::size_t unknowns = nodes_ + 4;
-  loops::add_transposed<kHalfBand>(nozzle_, node_pull_.data(), gradient_.data(), unknowns);
-  loops::add_transposed<kHalfBand + 1>(middle_, middle_pull_.data(), gradient_.data(), unknowns);
+  loops::add_transposed<kHalfBand>(nozzle_, at_nodes_.pull.data(), gradient_.data(), unknowns);
+  loops::add_transposed<kHalfBand + 1>(middle_, at_middles_.pull.data(), gradient_.data(),
+                                       unknowns);
   loops::add_transposed<kHalfBand + 1>(jerk, jerk_pull_.data(), gradient_.data(), unknowns);
   for (const RowKind kind : kRowKinds) {
     if (kinds[index_of(kind)]) {
@@ -434,9 +436,9 @@ void FlatForm::write(dynamics::AxisTrajectory& base) {
 
 void FlatForm::write_nozzles(std::vector<std::vector<double>>& nozzles_mm) {
   nozzles_mm.assign(1, std::vector<double>(nodes_));
-  loops::apply<kHalfBand>(nozzle_, c_.data(), node_pull_.data(), nodes_);
+  loops::apply<kHalfBand>(nozzle_, c_.data(), at_nodes_.pull.data(), nodes_);
   for (std::size_t k = 0; k < nodes_; ++k) {
-    nozzles_mm[0][k] = window_->origin_mm + window_->unit[0] * node_pull_[k];
+    nozzles_mm[0][k] = window_->origin_mm + window_->unit[0] * at_nodes_.pull[k];
   }
 }
 

@@ -86,6 +86,13 @@ class FlatForm {
   void write_nozzles(std::vector<std::vector<double>>& nozzles_mm);
 
  private:
+  // The weights of (p − r)² at nodes, or at middles.
+  struct Tracked {
+    Padded reference;
+    Padded weight;
+    Padded pull;  // weight times p − r
+  };
+
   void find_ends();
   void keep_ends();
   void add_up_cost();
@@ -105,13 +112,8 @@ class FlatForm {
   Padded saved_;
   Padded step_;
   Padded gradient_;
-  // Weights of (p − r)² at nodes and middles. A pull is the weight times p − r.
-  Padded node_reference_;
-  Padded middle_reference_;
-  Padded node_weight_;
-  Padded middle_weight_;
-  Padded node_pull_;
-  Padded middle_pull_;
+  Tracked at_nodes_;
+  Tracked at_middles_;
   Padded jerk_pull_;  // ρ j
   double half_cost_ = 0.0;
   double decrement_ = 0.0;

@@ -144,21 +144,21 @@ bool LaneStages<Lanes, V, W>::carry_cost_back(std::size_t k, const PerKind<const
     of_accel = of_accel + (accel(0, v) * in[v] + accel(1, v) * in[g + v]);
     accel_square = accel_square + (accel(0, v) * u[v] + accel(1, v) * u[g + v]);
     c[v] = own(0, v) * in[v] + own(2, v) * in[g + v] +
-           middle * load<Lanes>(middle_cross_.at(kLanes * v));
+           middle * load<Lanes>(middle_.cross.at(kLanes * v));
     c[g + v] = own(1, v) * in[v] + own(3, v) * in[g + v] +
-               middle * load<Lanes>(middle_cross_.at(kLanes * (g + v)));
+               middle * load<Lanes>(middle_.cross.at(kLanes * (g + v)));
   }
   const double curvature =
       jerk_weight_ + (jerk_weight != nullptr ? jerk_weight[k] : 0.0) + sum(of_input) +
       (kBaseByJerk[0] * in_base[0] + kBaseByJerk[1] * in_base[1] + in_base[2]) +
-      middle * middle_curvature_;
+      middle * middle_.curvature;
   if (!(curvature > 0.0)) {
     return false;
   }
   double cb[3] = {
-      in_base[0] + middle * middle_base_cross_[0],
-      in_base[0] + in_base[1] + middle * middle_base_cross_[1],
-      0.5 * in_base[0] + in_base[1] + in_base[2] + sum(of_accel) + middle * middle_base_cross_[2]};
+      in_base[0] + middle * middle_.base_cross[0],
+      in_base[0] + in_base[1] + middle * middle_.base_cross[1],
+      0.5 * in_base[0] + in_base[1] + in_base[2] + sum(of_accel) + middle * middle_.base_cross[2]};
   // Computes the feedback. A prescribed feedback has entries for the base alone, so it adds nothing
   // to P_ss.
   double* const f = at.feedback.data() + k * state_size();
@@ -195,7 +195,7 @@ bool LaneStages<Lanes, V, W>::carry_cost_back(std::size_t k, const PerKind<const
   next[2][2] = 0.5 * u_base[0] + u_base[1] + u_base[2] + sum(accel_square);
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t j = i; j < 3; ++j) {
-      next[i][j] += middle * middle_base_square_[i][j] +
+      next[i][j] += middle * middle_.base_square[i][j] +
                     (prescribed ? cb[i] * fb[j] + fb[i] * cb[j] : fb[i] * cb[j]);
       pbb[i][j] = pbb[j][i] = next[i][j];
     }
@@ -258,7 +258,7 @@ void LaneStages<Lanes, V, W>::carry_block_back(std::size_t a, std::size_t v, con
     block[3][lane] = own_1 * place_r + own_3 * rate_r + f[r] * c[g + v];
     if constexpr (kCosts) {
       const auto square = [&](std::size_t row, std::size_t group) {
-        return middle * load<Lanes>(middle_square_.at(row * swing + kLanes * group));
+        return middle * load<Lanes>(middle_.square.at(row * swing + kLanes * group));
       };
       block[0][lane] =
           block[0][lane] +
@@ -301,13 +301,13 @@ void LaneStages<Lanes, V, W>::carry_cross_back(const LaneRow<Lanes, 2 * V>& u,
     const auto carry = [&](std::size_t i, const Lanes& place, const Lanes& rate) {
       Lanes next_place =
           own(0, v) * place + own(2, v) * rate +
-          (middle * load<Lanes>(middle_by_base_.at(i * swing + kLanes * v)) + fb[i] * c[v]);
+          (middle * load<Lanes>(middle_.by_base.at(i * swing + kLanes * v)) + fb[i] * c[v]);
       if (i == 0) {
         next_place = next_place + node * load<Lanes>(node_cross_.at(kLanes * v));
       }
       store(next_place, base_to_go(i, v));
       store(own(1, v) * place + own(3, v) * rate +
-                (middle * load<Lanes>(middle_by_base_.at(i * swing + kLanes * (g + v))) +
+                (middle * load<Lanes>(middle_.by_base.at(i * swing + kLanes * (g + v))) +
                  fb[i] * c[g + v]),
             base_to_go(i, g + v));
     };

@@ -92,22 +92,22 @@ class LaneStages final : public StageKernel {
     is_model_.assign_zeros(m);
     by_model_.assign_zeros(m * k);
     by_mode_.assign_zeros(k * m);
-    middle_by_model_.assign_zeros(m * 2 * k);
-    middle_by_place_.assign_zeros(2 * k * m);
-    middle_base_.assign_zeros(3 * m);
-    middle_input_.assign_zeros(m);
+    middle_.by_model.assign_zeros(m * 2 * k);
+    middle_.by_place.assign_zeros(2 * k * m);
+    middle_.base.assign_zeros(3 * m);
+    middle_.input.assign_zeros(m);
     node_square_.assign_zeros(k * k);
     node_cross_.assign_zeros(k);
-    middle_square_.assign_zeros(4 * k * k);
+    middle_.square.assign_zeros(4 * k * k);
     in_one_model_.assign(groups() * groups(), 0);
-    middle_by_base_.assign_zeros(3 * 2 * k);
-    middle_cross_.assign_zeros(2 * k);
+    middle_.by_base.assign_zeros(3 * 2 * k);
+    middle_.cross.assign_zeros(2 * k);
     cost_to_go_.assign_zeros(4 * k * k);
     base_to_go_.assign_zeros(3 * 2 * k);
     node_base_ = 0.0;
-    middle_base_square_ = {};
-    middle_base_cross_ = {};
-    middle_curvature_ = 0.0;
+    middle_.base_square = {};
+    middle_.base_cross = {};
+    middle_.curvature = 0.0;
     for (std::size_t c = 0; c < model.models.size(); ++c) {
       add_model(c, model.models[c].parts, model.models[c].share);
     }
@@ -222,13 +222,13 @@ class LaneStages final : public StageKernel {
     }
     share_[c] = share;
     is_model_[c] = 1.0;
-    middle_input_[c] = input;
+    middle_.input[c] = input;
     for (std::size_t i = 0; i < swing; ++i) {
-      middle_by_model_[c * swing + i] = middle[i];
-      middle_by_place_[i * models + c] = middle[i];
-      middle_cross_[i] += share * input * middle[i];
+      middle_.by_model[c * swing + i] = middle[i];
+      middle_.by_place[i * models + c] = middle[i];
+      middle_.cross[i] += share * input * middle[i];
       for (std::size_t j = 0; j < swing; ++j) {
-        middle_square_[i * swing + j] += share * middle[i] * middle[j];
+        middle_.square[i * swing + j] += share * middle[i] * middle[j];
       }
     }
     for (std::size_t i = 0; i < k; ++i) {
@@ -240,16 +240,16 @@ class LaneStages final : public StageKernel {
     node_base_ += share;
     for (std::size_t i = 0; i < 3; ++i) {
       const double of_base = middle[swing + i];
-      middle_base_[i * models + c] = of_base;
-      middle_base_cross_[i] += share * input * of_base;
+      middle_.base[i * models + c] = of_base;
+      middle_.base_cross[i] += share * input * of_base;
       for (std::size_t j = 0; j < swing; ++j) {
-        middle_by_base_[i * swing + j] += share * of_base * middle[j];
+        middle_.by_base[i * swing + j] += share * of_base * middle[j];
       }
       for (std::size_t j = 0; j < 3; ++j) {
-        middle_base_square_[i][j] += share * of_base * middle[swing + j];
+        middle_.base_square[i][j] += share * of_base * middle[swing + j];
       }
     }
-    middle_curvature_ += share * input * input;
+    middle_.curvature += share * input * input;
   }
 
   // Bᵀ v
@@ -343,6 +343,23 @@ class LaneStages final : public StageKernel {
   template <std::size_t N>
   using Numbers = KernelNumbers<Lanes, N>;
 
+  // p in the middle of an interval.
+  struct Middle {
+    // m of the swing, by models and by places; m of the base; and μ.
+    Numbers<2 * kM * kK> by_model;
+    Numbers<2 * kM * kK> by_place;
+    Numbers<3 * kM> base;
+    Numbers<kM> input;
+    // Σ α of the squares of p.
+    Numbers<4 * kK * kK> square;
+    Numbers<6 * kK> by_base;
+    std::array<std::array<double, 3>, 3> base_square{};
+    // Σ α μ m and Σ α μ².
+    Numbers<2 * kK> cross;
+    std::array<double, 3> base_cross{};
+    double curvature = 0.0;
+  };
+
   std::size_t groups_ = 0;
   std::size_t model_groups_ = 0;
   double jerk_weight_ = 0.0;
@@ -354,24 +371,12 @@ class LaneStages final : public StageKernel {
   // A mode's gain in a model, by models and by modes.
   Numbers<kM * kK> by_model_;
   Numbers<kM * kK> by_mode_;
-  // m of the swing, by models and by places; m of the base; and μ.
-  Numbers<2 * kM * kK> middle_by_model_;
-  Numbers<2 * kM * kK> middle_by_place_;
-  Numbers<3 * kM> middle_base_;
-  Numbers<kM> middle_input_;
-  // Σ α of the squares of p at nodes, where only the places of the swing count, and Σ α of the
-  // squares of p in the middle of an interval.
+  // Σ α of the squares of p at nodes, where only the places of the swing count.
   Numbers<kK * kK> node_square_;
   Numbers<kK> node_cross_;
   double node_base_ = 0.0;
-  Numbers<4 * kK * kK> middle_square_;
   std::vector<char> in_one_model_;  // whether some model has modes of both groups
-  Numbers<6 * kK> middle_by_base_;
-  std::array<std::array<double, 3>, 3> middle_base_square_{};
-  // Σ α μ m and Σ α μ².
-  Numbers<2 * kK> middle_cross_;
-  std::array<double, 3> middle_base_cross_{};
-  double middle_curvature_ = 0.0;
+  Middle middle_;
   Numbers<4 * kK * kK> cost_to_go_;  // P_ss
   Numbers<6 * kK> base_to_go_;       // P_bs
   std::array<std::array<double, 3>, 3> base_square_{};

@@ -40,12 +40,12 @@ void LaneStages<Lanes, V, W>::evaluate(StageArrays& at) const {
       store(pull, at.node_pull.data() + place);
       cost = cost + pull * error;
       if (k + 1 < at.nodes) {
-        Lanes middle = at.inputs[k] * load<Lanes>(middle_input_.at(kLanes * q));
+        Lanes middle = at.inputs[k] * load<Lanes>(middle_.input.at(kLanes * q));
         for (std::size_t i = 0; i < 3; ++i) {
-          middle = middle + b[i] * load<Lanes>(middle_base_.at(i * models + kLanes * q));
+          middle = middle + b[i] * load<Lanes>(middle_.base.at(i * models + kLanes * q));
         }
         for (std::size_t i = 0; i < swing; ++i) {
-          middle = middle + z[i] * load<Lanes>(middle_by_place_.at(i * models + kLanes * q));
+          middle = middle + z[i] * load<Lanes>(middle_.by_place.at(i * models + kLanes * q));
         }
         const Lanes off = middle - load<Lanes>(at.middle_aim.data() + place);
         const Lanes middle_pull = at.middle_weight[k] * share * off;
@@ -132,10 +132,10 @@ void LaneStages<Lanes, V, W>::carry_slope_back(const PerKind<const double*>& for
     const double* const pulls = at.middle_pull.data() + k * models;
     for (std::size_t q = 0; q < model_groups(); ++q) {
       const Lanes pull = load<Lanes>(pulls + kLanes * q);
-      by_input = by_input + pull * load<Lanes>(middle_input_.at(kLanes * q));
-      by_accel = by_accel + pull * load<Lanes>(middle_base_.at(2 * models + kLanes * q));
+      by_input = by_input + pull * load<Lanes>(middle_.input.at(kLanes * q));
+      by_accel = by_accel + pull * load<Lanes>(middle_.base.at(2 * models + kLanes * q));
       for (std::size_t i = 0; i < 2; ++i) {
-        of_base[i] = of_base[i] + pull * load<Lanes>(middle_base_.at(i * models + kLanes * q));
+        of_base[i] = of_base[i] + pull * load<Lanes>(middle_.base.at(i * models + kLanes * q));
       }
     }
     const double down = jerk_weight * at.inputs[k] - (jerk_force != nullptr ? jerk_force[k] : 0.0) +
@@ -155,7 +155,7 @@ void LaneStages<Lanes, V, W>::carry_slope_back(const PerKind<const double*>& for
     for (std::size_t c = 0; c < models; ++c) {
       for (std::size_t v = 0; v < 2 * v_count; ++v) {
         g[v] = g[v] +
-               pulls[c] * load<Lanes>(middle_by_model_.at(c * 2 * kLanes * v_count + kLanes * v));
+               pulls[c] * load<Lanes>(middle_.by_model.at(c * 2 * kLanes * v_count + kLanes * v));
       }
     }
     for (std::size_t v = 0; v < 2 * v_count; ++v) {

@@ -55,7 +55,7 @@ report::Report new_report(std::string command, const Job& job) {
   report.input = job.input_name;
   report.output = job.output_name;
   report.firmware = to_string(job.settings.printer.firmware);
-  report.freq_error = job.settings.freq_error();
+  report.others.freq_error = job.settings.freq_error();
   report.max_flow_mm3_s = job.settings.extruder.max_flow_mm3_s;
   report.free_timing.tolerance_mm = job.settings.timing.tolerance_um * 1e-3;
   for (machine::SettingRow& setting : machine::rows(job.settings)) {
@@ -102,9 +102,9 @@ void add_verification(const verify::VerifyReport& verified, record::Recorder& re
     const report::Spread before = spread(verified.detuned[i].uncompensated);
     const report::Spread after = spread(verified.detuned[i].compensated);
     if (i < kErrors) {
-      report.sensitivity.push_back({verify::kFrequencyErrors[i], before, after});
+      report.others.sensitivity.push_back({verify::kFrequencyErrors[i], before, after});
     } else {
-      report.plants.push_back({before, after});
+      report.others.plants.push_back({before, after});
     }
   }
   if (verified.too_much_flow && report.max_flow_mm3_s) {

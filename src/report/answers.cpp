@@ -99,7 +99,7 @@ Better better(const Report& report) {
     result.edge = {report.measured.uncompensated.line.edge.rms_mm,
                    report.measured.compensated.line.edge.rms_mm, std::nullopt};
   }
-  for (const Sensitivity& one : report.sensitivity) {
+  for (const Sensitivity& one : report.others.sensitivity) {
     if (is_off(one.frequency_error)) {
       Comparison& off = result.off ? *result.off : result.off.emplace();
       off.now_mm = std::max(off.now_mm, one.uncompensated.rms_mm);
@@ -235,9 +235,9 @@ std::string made_for_text(const Report& report) {
     text +=
         fmt::format("{}{} {} ({})", text.empty() ? "" : "; ", axis.name, axis.model, axis.origin);
   }
-  return text + (report.freq_error > 0.0
-                     ? fmt::format("; frequencies up to {:.3g} % off", 100.0 * report.freq_error)
-                     : "; exact frequencies");
+  return text + (report.others.freq_error > 0.0 ? fmt::format("; frequencies up to {:.3g} % off",
+                                                              100.0 * report.others.freq_error)
+                                                : "; exact frequencies");
 }
 
 }  // namespace unflex::report

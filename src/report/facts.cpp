@@ -50,15 +50,15 @@ void add_work(Facts& facts, const Report& r) {
 }
 
 void add_nozzle(Facts& facts, const Report& r) {
-  if (!r.plants.empty()) {
+  if (!r.others.plants.empty()) {
     facts.add("If the axes are as one of the plants",
-              fmt::format("{} µm RMS", range_text(r.plants, &PlantDeviation::compensated)));
+              fmt::format("{} µm RMS", range_text(r.others.plants, &PlantDeviation::compensated)));
   }
-  if (r.robustness) {
+  if (r.others.robustness) {
     facts.add("Suits several models",
               fmt::format("{} µm RMS as optimised, {} for the nominal alone",
-                          micrometres_text(r.robustness->rms_mm),
-                          micrometres_text(r.robustness->nominal_rms_mm)));
+                          micrometres_text(r.others.robustness->rms_mm),
+                          micrometres_text(r.others.robustness->nominal_rms_mm)));
   }
   if (r.measured.unshaped) {
     facts.add("Without the printer's own shaper",

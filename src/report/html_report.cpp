@@ -139,7 +139,7 @@ Json remarks_json(const Report& r) {
           {"warning_count", r.warnings.size()},
           {"fallbacks", fallbacks},
           {"fallback_count", r.runs.fallback},
-          {"kept_moves", Json(r.kept_moves)}};
+          {"kept_moves", Json(r.runs.kept_moves)}};
 }
 
 Json data_json(const Report& r) {
@@ -162,7 +162,7 @@ Json data_json(const Report& r) {
       {"worst", {places_json(recording.worst_before), places_json(recording.worst_after)}},
       {"histogram", histogram_json(recording.histogram)},
       {"frequency_errors", recording.frequency_errors},
-      {"freq_error", r.freq_error},
+      {"freq_error", r.others.freq_error},
       {"contenders", contenders_json(recording.contenders)},
       {"extruding_s", rounded(r.measured.uncompensated.extruding.duration_s, 0.1)},
       {"shapers_s", rounded(recording.shapers_measured_s, 0.1)},

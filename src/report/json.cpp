@@ -194,19 +194,19 @@ void add_answers(const Report& r, Json& json) {
 void add_motion(const Report& r, Json& json) {
   json["print_time_s"] = {{"reference", r.measured.uncompensated.time_s},
                           {"emitted", r.measured.compensated.time_s}};
-  json["freq_error"] = r.freq_error;
-  json["sensitivity"] = sensitivity_json(r.sensitivity);
+  json["freq_error"] = r.others.freq_error;
+  json["sensitivity"] = sensitivity_json(r.others.sensitivity);
   json["deviation"] = {{"uncompensated", rows_json(r.measured.uncompensated)},
                        {"unshaped", r.measured.unshaped ? rows_json(*r.measured.unshaped) : Json()},
                        {"compensated", rows_json(r.measured.compensated)}};
   json["corners"] = {{"uncompensated", corners_json(r.measured.uncompensated.corners)},
                      {"compensated", corners_json(r.measured.compensated.corners)}};
   json["laid_line"] = laid_line_json(r.measured);
-  json["plants"] = plants_json(r.plants);
+  json["plants"] = plants_json(r.others.plants);
   json["robustness"] = nullptr;
-  if (r.robustness) {
-    json["robustness"] = {{"rms_mm", r.robustness->rms_mm},
-                          {"nominal_rms_mm", r.robustness->nominal_rms_mm}};
+  if (r.others.robustness) {
+    json["robustness"] = {{"rms_mm", r.others.robustness->rms_mm},
+                          {"nominal_rms_mm", r.others.robustness->nominal_rms_mm}};
   }
   json["base"] = {{"max_velocity_mm_s", r.measured.base.max_velocity_mm_s},
                   {"max_accel_mm_s2", r.measured.base.max_accel_mm_s2},
@@ -253,7 +253,7 @@ void add_work(const Report& r, Json& json) {
   json["runs"] = {
       {"total", r.runs.total}, {"compensated", r.runs.compensated}, {"fallback", r.runs.fallback}};
   json["fallbacks"] = fallbacks_json(r.runs.fallbacks);
-  json["kept_moves"] = Json(r.kept_moves);
+  json["kept_moves"] = Json(r.runs.kept_moves);
   json["extruded_path"] = path_json(r.extruded_path);
   json["unknown_commands"] = unknown_json(r.unknown_commands);
   json["line_budget"] = budget_json(r.line_budget);

@@ -173,7 +173,7 @@ void write_unshaped(Sink out, const std::optional<verify::Deviation>& unshaped) 
 
 // The error by how far the true frequencies are off.
 void write_sensitivity(Sink out, const Report& r) {
-  if (r.sensitivity.empty()) {
+  if (r.others.sensitivity.empty()) {
     return;
   }
   std::string errors;
@@ -183,16 +183,17 @@ void write_sensitivity(Sink out, const Report& r) {
     rms += (rms.empty() ? "" : ", ") + micrometres_text(rms_mm);
   };
   bool has_exact = false;
-  for (const Sensitivity& one : r.sensitivity) {
+  for (const Sensitivity& one : r.others.sensitivity) {
     if (!has_exact && one.frequency_error > 0.0) {
       add("0", r.measured.compensated.extruding.contour_rms_mm);
       has_exact = true;
     }
     add(fmt::format("{:+.0f}", 100.0 * one.frequency_error), one.compensated.rms_mm);
   }
-  fmt::format_to(
-      out, "sensitivity   {} µm RMS if frequencies are off by {} %{}\n", rms, errors,
-      r.freq_error > 0.0 ? fmt::format("; made for ±{:.3g} %", 100.0 * r.freq_error) : "");
+  fmt::format_to(out, "sensitivity   {} µm RMS if frequencies are off by {} %{}\n", rms, errors,
+                 r.others.freq_error > 0.0
+                     ? fmt::format("; made for ±{:.3g} %", 100.0 * r.others.freq_error)
+                     : "");
 }
 
 void write_plants(Sink out, const std::vector<PlantDeviation>& plants) {
@@ -254,7 +255,7 @@ void write_runs(Sink out, const Report& r) {
     fmt::format_to(out, "              and {} more, listed by --report\n",
                    r.runs.fallback - listed);
   }
-  for (const auto& [reason, count] : r.kept_moves) {
+  for (const auto& [reason, count] : r.runs.kept_moves) {
     fmt::format_to(out, "              {} other moves stay as they are: {}\n", count, reason);
   }
   fmt::format_to(out, "solver        {}, {} parts, {} iterations\n", r.solver.engine,
@@ -456,13 +457,13 @@ std::string to_text(const Report& report) {
   write_line(out, report.measured.uncompensated.line, report.measured.compensated.line);
   write_sensitivity(out, report);
   write_unshaped(out, report.measured.unshaped);
-  write_plants(out, report.plants);
-  if (report.robustness) {
+  write_plants(out, report.others.plants);
+  if (report.others.robustness) {
     fmt::format_to(
         out,
         "band          suiting it leaves {} instead of {} µm RMS where the frequencies are exact\n",
-        micrometres_text(report.robustness->rms_mm),
-        micrometres_text(report.robustness->nominal_rms_mm));
+        micrometres_text(report.others.robustness->rms_mm),
+        micrometres_text(report.others.robustness->nominal_rms_mm));
   }
   write_times(out, report);
   write_timing(out, report);

@@ -69,7 +69,7 @@ void Admission::admit(RunJob& job) {
 void Admission::keep_lines(RunJob& job) {
   static_cast<void>(nozzle_.follow(job.piece));
   for (const gcode::Event& event : job.piece.events) {
-    count_kept_moves(event, rules_->verify.fixed.firmware, report_->kept_moves);
+    count_kept_moves(event, rules_->verify.fixed.firmware, report_->runs.kept_moves);
   }
   keep_as_sliced(job);
 }

@@ -196,7 +196,7 @@ std::string RunWriter::finish() {
   report_->line_budget.cost_rms_mm = emission_.rms_mm();
   report_->line_budget.cost_max_mm = emission_.max_mm;
   if (rules_->setup.is_robust()) {
-    report_->robustness = {robust_.rms_mm(), nominal_.rms_mm()};
+    report_->others.robustness = {robust_.rms_mm(), nominal_.rms_mm()};
   }
   return text;
 }

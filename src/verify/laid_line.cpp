@@ -271,9 +271,9 @@ void LaidLine::measure_ends(const Line& line) {
     last.laid_mm[0] += bin.laid_mm[0];
   }
   if (line.length_mm >= kShortest_mm && line.first.wanted_mm > 0.0 && last.wanted_mm > 0.0) {
-    lines_with_ends_ += 1.0;
-    first_.add(width_error(line.first));
-    last_.add(width_error(last));
+    ends_.lines += 1.0;
+    ends_.first.add(width_error(line.first));
+    ends_.last.add(width_error(last));
   }
 }
 
@@ -301,11 +301,11 @@ void LaidLine::count(const Bin& bin) {
   const double contour_mm =
       bin.duration_s > 0.0 ? std::sqrt(bin.contour2_mm2_s / bin.duration_s) : 0.0;
   const double edge_mm = contour_mm + 0.5 * std::abs(error) * model_.width_mm;
-  edge_mm_.add_square(edge_mm * edge_mm, 1.0);
-  sum_edge2_ += edge_mm * edge_mm;
-  if (edge_mm > largest_edge_mm_) {
-    largest_edge_mm_ = edge_mm;
-    edge_line_ = bin.line;
+  edges_.error_mm.add_square(edge_mm * edge_mm, 1.0);
+  edges_.sum2 += edge_mm * edge_mm;
+  if (edge_mm > edges_.largest_mm) {
+    edges_.largest_mm = edge_mm;
+    edges_.line = bin.line;
   }
 }
 
@@ -350,12 +350,12 @@ LineStats LaidLine::stats() const {
   for (std::size_t i = 0; i < kOtherHotends; ++i) {
     result.other[i] = other_[i].stats(bins_);
   }
-  result.first = first_.stats(lines_with_ends_);
-  result.last = last_.stats(lines_with_ends_);
+  result.first = ends_.first.stats(ends_.lines);
+  result.last = ends_.last.stats(ends_.lines);
   if (bins_ > 0.0) {
-    result.edge = {std::sqrt(sum_edge2_ / bins_),
-                   std::min(edge_mm_.quantile(0.99), largest_edge_mm_), largest_edge_mm_,
-                   edge_line_};
+    result.edge = {std::sqrt(edges_.sum2 / bins_),
+                   std::min(edges_.error_mm.quantile(0.99), edges_.largest_mm), edges_.largest_mm,
+                   edges_.line};
   }
   return result;
 }

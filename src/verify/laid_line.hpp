@@ -121,6 +121,19 @@ class LaidLine {
     [[nodiscard]] EndStats stats(double count) const;
   };
 
+  struct LineEnds {
+    Ends first;
+    Ends last;
+    double lines = 0.0;  // how many have been measured
+  };
+
+  struct Edges {
+    LogHistogram error_mm;
+    double sum2 = 0.0;
+    double largest_mm = 0.0;
+    std::size_t line = 0;
+  };
+
   void take_pieces(const ReferencePath& path);
   void end_line();
   void extend(Line& line, const PathPiece& piece);
@@ -167,14 +180,9 @@ class LaidLine {
 
   Widths width_;
   std::array<Widths, kOtherHotends> other_;
-  LogHistogram edge_mm_;
-  double sum_edge2_ = 0.0;
-  double largest_edge_mm_ = 0.0;
-  std::size_t edge_line_ = 0;
+  Edges edges_;
   double bins_ = 0.0;
-  Ends first_;
-  Ends last_;
-  double lines_with_ends_ = 0.0;
+  LineEnds ends_;
 };
 
 }  // namespace unflex::verify

@@ -562,11 +562,11 @@ TEST_F(Texts, RewriteDenseWipesWhereTheirLimitsCanBeRaised) {
                      "limits.max_e_velocity_mm_s=50"});
     EXPECT_LE(report_.measured.output.max_lines_per_s, 200.0) << firmware;
     EXPECT_THAT(output, Not(HasSubstr(wipe.substr(0, wipe.find('\n'))))) << firmware;
-    EXPECT_FALSE(report_.kept_moves.contains("retracting move")) << firmware;
+    EXPECT_FALSE(report_.runs.kept_moves.contains("retracting move")) << firmware;
     EXPECT_NEAR(report_.measured.compensated.extrusion_mm, 2.0 - 40 * 0.05 - 0.3, 1e-9) << firmware;
   }
   EXPECT_THAT(compensated(input), HasSubstr(wipe));
-  EXPECT_EQ(report_.kept_moves["retracting move"], 40U);
+  EXPECT_EQ(report_.runs.kept_moves["retracting move"], 40U);
 }
 
 TEST_F(Texts, KeepToTheBudgetWhereTheSlicedLinesDoNot) {

@@ -89,26 +89,27 @@ report::Report made_for(const std::vector<std::string>& plants) {
 }
 
 TEST(Plants, AreSuitedByTheBaseAndMeasured) {
-  EXPECT_TRUE(made_for({}).plants.empty());
+  EXPECT_TRUE(made_for({}).others.plants.empty());
   const auto of_both = [](double share) {
     return made_for({"dynamics.x.plant=" + plants(share), "dynamics.y.plant=" + plants(share)});
   };
   const report::Report hardly = of_both(1e-6);
   const report::Report suited = of_both(0.3);
   EXPECT_EQ(suited.runs.fallback, 0U) << testing::complaints(suited);
-  ASSERT_EQ(suited.plants.size(), 2U);
-  ASSERT_EQ(hardly.plants.size(), 2U);
-  ASSERT_TRUE(suited.robustness.has_value());
+  ASSERT_EQ(suited.others.plants.size(), 2U);
+  ASSERT_EQ(hardly.others.plants.size(), 2U);
+  ASSERT_TRUE(suited.others.robustness.has_value());
   const auto together_mm = [](const report::Report& made) {
-    return std::hypot(made.plants[0].compensated.rms_mm, made.plants[1].compensated.rms_mm);
+    return std::hypot(made.others.plants[0].compensated.rms_mm,
+                      made.others.plants[1].compensated.rms_mm);
   };
   EXPECT_LT(together_mm(suited), 0.85 * together_mm(hardly));
   EXPECT_GT(suited.measured.compensated.extruding.contour_rms_mm,
             hardly.measured.compensated.extruding.contour_rms_mm);
   // One axis alone may have plants.
   const report::Report of_y = made_for({"dynamics.y.plant=" + plants(0.3)});
-  EXPECT_EQ(of_y.plants.size(), 2U);
-  EXPECT_TRUE(of_y.robustness.has_value());
+  EXPECT_EQ(of_y.others.plants.size(), 2U);
+  EXPECT_TRUE(of_y.others.robustness.has_value());
 }
 
 }  // namespace

@@ -67,7 +67,7 @@ TEST(OptimalTiming, LetsTheNozzleStrayTwiceAsFarWhereTheFrequencyIsOff) {
   const report::Report report = compensated(tower(), {kKnown, "dynamics.freq_error=0.05"}).report;
   EXPECT_LE(largest_error_mm(report), 1.1 * kTolerance_mm);
   std::size_t edges = 0;
-  for (const auto& row : report.sensitivity) {
+  for (const auto& row : report.others.sensitivity) {
     if (std::abs(std::abs(row.frequency_error) - 0.05) < 1e-9) {
       ++edges;
       EXPECT_LE(row.compensated.max_mm, 1.1 * 2.0 * kTolerance_mm) << row.frequency_error;

@@ -74,15 +74,16 @@ void expect_robust(const std::string& text) {
   EXPECT_GT(robust.measured.compensated.extruding.contour_rms_mm,
             nominal.measured.compensated.extruding.contour_rms_mm)
       << "nothing is for nothing";
-  EXPECT_EQ(robust.freq_error, 0.1);
-  EXPECT_FALSE(nominal.robustness.has_value());
-  ASSERT_TRUE(robust.robustness.has_value());
+  EXPECT_EQ(robust.others.freq_error, 0.1);
+  EXPECT_FALSE(nominal.others.robustness.has_value());
+  ASSERT_TRUE(robust.others.robustness.has_value());
   // The cost of writing lines is small in comparison.
-  EXPECT_NEAR(robust.robustness->rms_mm, robust.measured.compensated.extruding.contour_rms_mm,
-              0.15 * robust.robustness->rms_mm);
-  EXPECT_LT(robust.robustness->nominal_rms_mm,
+  EXPECT_NEAR(robust.others.robustness->rms_mm,
+              robust.measured.compensated.extruding.contour_rms_mm,
+              0.15 * robust.others.robustness->rms_mm);
+  EXPECT_LT(robust.others.robustness->nominal_rms_mm,
             nominal.measured.compensated.extruding.contour_rms_mm);
-  EXPECT_GT(robust.robustness->nominal_rms_mm, 0.0);
+  EXPECT_GT(robust.others.robustness->nominal_rms_mm, 0.0);
   EXPECT_LT(robust.measured.compensated.extruding.contour_rms_mm,
             0.2 * testing::unshaped(robust).extruding.contour_rms_mm);
 }
@@ -117,12 +118,12 @@ TEST(Robustness, IsReportedForEveryPrint) {
   std::ifstream print(std::filesystem::path(test_paths::kData) / "pipeline_wallring.gcode");
   const std::string text = fast_walls(print);
   const report::Report report = compensated(text, {});
-  EXPECT_EQ(report.freq_error, 0.0);
-  ASSERT_EQ(report.sensitivity.size(), 6U);
+  EXPECT_EQ(report.others.freq_error, 0.0);
+  ASSERT_EQ(report.others.sensitivity.size(), 6U);
   const std::array<double, 6> errors = {-0.15, -0.10, -0.05, 0.05, 0.10, 0.15};
   for (std::size_t i = 0; i < errors.size(); ++i) {
-    EXPECT_EQ(report.sensitivity[i].frequency_error, errors[i]);
-    EXPECT_GT(report.sensitivity[i].compensated.rms_mm,
+    EXPECT_EQ(report.others.sensitivity[i].frequency_error, errors[i]);
+    EXPECT_GT(report.others.sensitivity[i].compensated.rms_mm,
               report.measured.compensated.extruding.contour_rms_mm);
   }
   // Verifying with the wrong frequency must give the reported value.
@@ -134,7 +135,7 @@ TEST(Robustness, IsReportedForEveryPrint) {
   job.settings.dynamics.y.freq_hz *= 1.1;
   const Result<report::Report> verified = verify(job, progress);
   ASSERT_TRUE(verified.has_value());
-  EXPECT_NEAR(report.sensitivity[4].compensated.rms_mm,
+  EXPECT_NEAR(report.others.sensitivity[4].compensated.rms_mm,
               verified->measured.compensated.extruding.contour_rms_mm,
               0.01 * verified->measured.compensated.extruding.contour_rms_mm);
 }

@@ -64,7 +64,7 @@ TEST_P(TenLayers, AreDrawnAsTheReadmeSays) {
   const report::Report exact = compensated(GetParam(), "0");
   const auto worse_rms_mm = [&](double error) {
     double worst = 0.0;
-    for (const report::Sensitivity& at : robust.sensitivity) {
+    for (const report::Sensitivity& at : robust.others.sensitivity) {
       worst = std::abs(std::abs(at.frequency_error) - error) < 1e-6
                   ? std::max(worst, at.compensated.rms_mm)
                   : worst;

@@ -181,13 +181,13 @@ TEST(HtmlReport, ShowsFirstHowRobustThePrintIs) {
 
 TEST(HtmlReport, TellsWhatSeveralModelsCost) {
   Report report = recorded_report();
-  report.robustness = {0.003, 0.0005};
+  report.others.robustness = {0.003, 0.0005};
   const auto facts = [&] {
     return nlohmann::json::parse(element(to_html(report), "data"))["facts"];
   };
   EXPECT_NE(facts().dump().find("3.00 µm RMS as optimised, 0.50 for the nominal alone"),
             std::string::npos);
-  report.robustness.reset();
+  report.others.robustness.reset();
   EXPECT_EQ(facts().dump().find("several models"), std::string::npos);
   EXPECT_NE(facts().dump().find("4.00 to 9.00 µm RMS"), std::string::npos);
 }
@@ -198,7 +198,7 @@ TEST(HtmlReport, LetsNoTextFromOutsideBecomeMarkup) {
   report.warnings = {kHostile};
   report.violations = {kHostile};
   report.runs.fallbacks = {{1, 2, kHostile}};
-  report.kept_moves = {{kHostile, 1}};
+  report.runs.kept_moves = {{kHostile, 1}};
   report.printer = {{kHostile, kHostile, kHostile}};
   report.recording->features[1].name = kHostile;
   const std::string page = to_html(report);

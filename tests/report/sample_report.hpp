@@ -94,10 +94,10 @@ inline Report sample_report() {
                           {0.055, 0.25, 0.3, 0.06, 820},
                           {0.005, 0.021, -0.09, 0.001, 817},
                           {0.04, 0.2, 0.25, 0.04, 821}}}};
-  r.freq_error = 0.1;
-  r.sensitivity = {{-0.1, {0.9, 0.2}, {0.03, 0.012}}, {0.05, {0.7, 0.15}, {0.02, 0.0061}}};
-  r.plants = {{{0.8, 0.18}, {0.02, 0.004}}, {{0.7, 0.15}, {0.03, 0.009}}};
-  r.robustness = {0.003, 0.0005};
+  r.others.freq_error = 0.1;
+  r.others.sensitivity = {{-0.1, {0.9, 0.2}, {0.03, 0.012}}, {0.05, {0.7, 0.15}, {0.02, 0.0061}}};
+  r.others.plants = {{{0.8, 0.18}, {0.02, 0.004}}, {{0.7, 0.15}, {0.03, 0.009}}};
+  r.others.robustness = {0.003, 0.0005};
   m.base.max_velocity_mm_s = 123.0;
   m.base.max_accel_mm_s2 = 19999.0;
   m.base.max_step_mm_s = 27.5;
@@ -117,7 +117,7 @@ inline Report sample_report() {
   m.compensated.extruding.contour_p999_mm = 0.0188;
   m.compensated_feed = {1.012, 1.019, 77};
   r.runs.fallbacks = {{10, 20, "no solution"}, {30, 44, "worse than the original"}};
-  r.kept_moves = {{"Z move", 12}};
+  r.runs.kept_moves = {{"Z move", 12}};
   r.extruded_path = {8000.0, 7000.0, {{"run left as sliced", 900.0}, {"start unknown", 100.0}}};
   r.unknown_commands = {{"M1234", 40, 12, 7, 100.0}, {"MY_MACRO", 1, 90, 0, 0.0}};
   r.line_budget = {850.0, 2, {{70, 75, 880.0}, {90, 91, 890.0}}, 0.0005, 0.0075};

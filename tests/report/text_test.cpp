@@ -197,7 +197,7 @@ TEST(Summary, DoesNotSpeakOfRunsWhereNothingWasSolved) {
 
 TEST(Summary, SpeaksOfNoBandWhereTheFrequenciesAreExact) {
   Report report = sample_report();
-  report.freq_error = 0.0;
+  report.others.freq_error = 0.0;
   EXPECT_THAT(to_text(report), HasSubstr("are off by -10, 0, +5 %\n"));
 }
 

@@ -157,6 +157,8 @@ struct Runs {
   std::size_t windows_total = 0;
   std::size_t windows_solved = 0;
   std::size_t windows_fallback = 0;  // windows of runs that kept their original moves
+  std::map<std::string, std::size_t>
+      kept_moves;  // reason → moves outside runs ("wipe", "Z move" …)
 };
 
 struct Solver {
@@ -184,6 +186,15 @@ struct Performance {
   double peak_rss_mb = 0.0;
 };
 
+// The print on machines that are not as the settings say.
+struct OtherMachines {
+  // The output is made for frequencies up to this share off, either way; 0: for exact ones.
+  double freq_error = 0.0;
+  std::vector<Sensitivity> sensitivity;  // by rising error
+  std::vector<PlantDeviation> plants;    // in the order of the settings
+  std::optional<Robustness> robustness;  // set if the base is to suit more models than one
+};
+
 struct Report {
   std::string command;  // "compensate", "verify"
   std::string version;
@@ -194,15 +205,9 @@ struct Report {
   PrinterFacts facts;
 
   verify::Measured measured;
-  // The output is made for frequencies up to this share off, either way; 0: for exact ones.
-  double freq_error = 0.0;
-  std::vector<Sensitivity> sensitivity;  // by rising error
-  std::vector<PlantDeviation> plants;    // in the order of the settings
-  std::optional<Robustness> robustness;  // set if the base is to suit more models than one
+  OtherMachines others;
 
   Runs runs;
-  std::map<std::string, std::size_t>
-      kept_moves;  // reason → moves outside runs ("wipe", "Z move" …)
   FreeTiming free_timing;
   ExtrudedPath extruded_path;
   std::vector<UnknownCommand> unknown_commands;  // by their first lines
