@@ -154,7 +154,8 @@ ErrorWeight error_weight(const Run& run, const Timetable& table, double t) {
 Axes<SpeedSteps> speed_steps(const dynamics::BaseTrajectory& base, const std::vector<double>& times,
                              const Ends& ends, const LineRules& rules) {
   const double most_mm_s = kOfSpeedStep * rules.max_speed_step_mm_s;
-  Axes<SpeedSteps> steps = on_all_axes(SpeedSteps{most_mm_s, rules.max_accel_mm_s2});
+  const double gain = rules.motors.gain_of_xy();
+  Axes<SpeedSteps> steps = on_all_axes(SpeedSteps{most_mm_s / gain, rules.max_accel_mm_s2 / gain});
   if (!rules.motors.shared_by_xy()) {
     return steps;
   }
@@ -167,10 +168,9 @@ Axes<SpeedSteps> speed_steps(const dynamics::BaseTrajectory& base, const std::ve
     // Motors do x + y or x − y, whatever the signs of the two changes.
     const double of_motors = std::max(rules.motors.largest_of_xy(change_mm_s),
                                       rules.motors.largest_of_xy({change_mm_s.x, -change_mm_s.y}));
-    const double left = std::max(both - of_motors, 0.0);
-    for_each_axis(
-        [&](SpeedSteps& axis, double change) { axis.at_mm_s.push_back(change + 0.5 * left); },
-        steps, change_mm_s);
+    const double left = std::max(both - of_motors, 0.0) / rules.motors.gain_of_both();
+    for_each_axis([&](SpeedSteps& axis, double change) { axis.at_mm_s.push_back(change + left); },
+                  steps, change_mm_s);
     before = after;
     before_s = after_s;
   };

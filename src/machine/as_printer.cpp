@@ -127,7 +127,7 @@ planner::Limits planner_limits(const Settings& settings) {
 planner::FirmwareConfig firmware_config(const Settings& settings) {
   planner::FirmwareConfig config;
   config.firmware = settings.printer.firmware;
-  config.kinematics = settings.kinematics.type;
+  config.motors = settings.motors();
   config.max_z_velocity_mm_s = settings.axis_max_velocity_mm_s()[gcode::Z];
   config.max_z_accel_mm_s2 = settings.axis_max_accel_mm_s2()[gcode::Z];
   config.max_extrude_only_velocity_mm_s = settings.max_extrude_only_velocity_mm_s();

@@ -106,6 +106,22 @@ std::string store(const Value& value, const Key& key, std::string& target) {
   return {};
 }
 
+std::string store(const Value& value, const Key& key, std::optional<Motors::Row>& target) {
+  const auto* list = std::get_if<std::vector<Value>>(&value.content);
+  Motors::Row row{};
+  bool is_row = list != nullptr && list->size() == row.size();
+  for (std::size_t i = 0; is_row && i < row.size(); ++i) {
+    const auto* number = std::get_if<double>(&(*list)[i].content);
+    is_row = number != nullptr && std::isfinite(*number);
+    row[i] = is_row ? *number : 0.0;
+  }
+  if (!is_row) {
+    return fmt::format("{} must be three numbers, as in [1, -1, 0]", key.name);
+  }
+  target = row;
+  return {};
+}
+
 std::string store(const Value& value, const Key& key, std::optional<Range>& target) {
   const auto* list = std::get_if<std::vector<Value>>(&value.content);
   const auto is_number = [](const Value& element) {

@@ -303,6 +303,13 @@ constexpr std::array kOtherKeys = {
 
     Key{"kinematics.type", &setting<&S::kinematics, &K::type>, kAny, "",
         "Which motors move which axes. base.* limits are those of motors"},
+    Key{"kinematics.joint_a", &of_axis<0, &S::kinematics, &K::joints>, kAny, "",
+        "Linear machines: travel of the first motor per mm of X, of Y and of Z",
+        "tripteron [1, 1, -1]"},
+    Key{"kinematics.joint_b", &of_axis<1, &S::kinematics, &K::joints>, kAny, "",
+        "Linear machines: travel of the second motor", "tripteron [1, -1, -1]"},
+    Key{"kinematics.joint_c", &of_axis<2, &S::kinematics, &K::joints>, kAny, "",
+        "Linear machines: travel of the third motor", "tripteron [1, 0, 1]"},
 
     Key{"base.max_velocity_mm_s", &setting<&S::base, &B::max_velocity_mm_s>, kPositive, "mm/s",
         "Speed a motor can do", "2 × limits.max_velocity_mm_s, or less by printer.max_step_rate_hz",

@@ -27,8 +27,9 @@ struct Bounds {
 using Member =
     std::variant<double& (*)(Draft&), std::optional<double>& (*)(Draft&), bool& (*)(Draft&),
                  std::optional<bool>& (*)(Draft&), Firmware& (*)(Draft&), Kinematics& (*)(Draft&),
-                 std::optional<Range>& (*)(Draft&), std::string& (*)(Draft&),
-                 std::vector<ModeSettings>& (*)(Draft&), std::vector<PlantSettings>& (*)(Draft&)>;
+                 std::optional<Range>& (*)(Draft&), std::optional<Motors::Row>& (*)(Draft&),
+                 std::string& (*)(Draft&), std::vector<ModeSettings>& (*)(Draft&),
+                 std::vector<PlantSettings>& (*)(Draft&)>;
 
 struct Key {
   std::string_view name;

@@ -55,6 +55,10 @@ std::string to_toml_value(const Range& value) {
   return fmt::format("[{}, {}]", value.min, value.max);
 }
 
+std::string to_toml_value(const Motors::Row& value) {
+  return fmt::format("[{}]", fmt::join(value, ", "));
+}
+
 std::string to_toml_value(const std::vector<ModeSettings>& value) {
   std::string text;
   for (const ModeSettings& mode : value) {
@@ -103,6 +107,9 @@ std::string range_text(const Key& key) {
   }
   if (std::holds_alternative<std::optional<Range>& (*)(Draft&)>(key.member)) {
     return "min < max";
+  }
+  if (std::holds_alternative<std::optional<Motors::Row>& (*)(Draft&)>(key.member)) {
+    return "three numbers";
   }
   if (std::holds_alternative<std::vector<ModeSettings>& (*)(Draft&)>(key.member)) {
     return "2 or 3 modes";

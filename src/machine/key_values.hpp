@@ -15,6 +15,7 @@ namespace unflex::machine {
 [[nodiscard]] std::string to_toml_value(Kinematics value);
 [[nodiscard]] std::string to_toml_value(const std::string& value);
 [[nodiscard]] std::string to_toml_value(const Range& value);
+[[nodiscard]] std::string to_toml_value(const Motors::Row& value);
 [[nodiscard]] std::string to_toml_value(const std::vector<ModeSettings>& value);
 [[nodiscard]] std::string to_toml_value(const std::vector<PlantSettings>& value);
 

@@ -187,14 +187,14 @@ void note_assumed_kinematics(Draft& draft) {
                    draft.settings.spec().brand, kKey)});
 }
 
-// Firmwares that limit motors hold X to the limits of a Z motor that moves it too, and runs leave
-// Z's limits as they are.
+// Firmwares that limit motors hold X to the limits of a Z motor that moves it too. Runs leave Z's
+// limits as they are.
 void note_slow_z_motor(Draft& draft) {
   const Settings& s = draft.settings;
   constexpr std::size_t kZ = 2;
   constexpr std::string_view kKey = "limits.max_z_accel_mm_s2";
   const double z_mm_s2 = s.axis_max_accel_mm_s2()[kZ];
-  if (!s.spec().motion.has_axis_limits || s.kinematics.type != Kinematics::corexz ||
+  if (!s.spec().motion.has_axis_limits || !s.motors().moves_xy(kZ) ||
       z_mm_s2 >= s.base_max_accel_mm_s2()) {
     return;
   }
@@ -202,10 +202,10 @@ void note_slow_z_motor(Draft& draft) {
   draft.settings.notes.push_back(
       {place ? *place : SourcePlace{draft.printer_file, 0},
        fmt::format(
-           "{} (M201 Z) is {}, and on a corexz the Z motor moves X too, so that the firmware "
+           "{} (M201 Z) is {}, and on a {} the Z motor moves X too, so that the firmware "
            "holds X to it and compensated lines, which need up to base.max_accel_mm_s2, {}, "
            "come out wrong; raise M201 Z on the printer if its motor can do it, and the key",
-           kKey, z_mm_s2, s.base_max_accel_mm_s2())});
+           kKey, z_mm_s2, to_string(s.kinematics.type), s.base_max_accel_mm_s2())});
 }
 
 bool is_known(const Note& note, const Draft& draft) {

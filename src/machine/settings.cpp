@@ -180,16 +180,23 @@ bool Settings::printer_presses() const {
 
 bool Settings::writes_pressure() const { return pressure.written.value_or(printer_presses()); }
 
+Motors Settings::motors() const {
+  const Motors named(kinematics.type, printer.firmware);
+  Motors::Rows rows = named.rows();
+  bool is_named = true;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    is_named = is_named && !kinematics.joints[i];
+    rows[i] = kinematics.joints[i].value_or(rows[i]);
+  }
+  return is_named ? named : Motors(rows);
+}
+
 double Settings::most_of_motor() const {
   if (spec().motion.has_axis_limits) {
     return 1.0;
   }
-  double most = 0.0;
-  const Motors motors(kinematics.type, printer.firmware);
-  for (const auto& row : motors.rows()) {
-    most = std::max(most, math::hypot(row[0], row[1]));
-  }
-  return most;
+  const Motors moved = motors();
+  return math::hypot(moved.gain_of_xy(), moved.shared_by_xy() ? moved.gain_of_xy() : 0.0);
 }
 
 double Settings::motor_max_velocity_mm_s() const {
@@ -222,10 +229,10 @@ double Settings::base_max_velocity_mm_s() const {
   if (base.max_velocity_mm_s) {
     return *base.max_velocity_mm_s;
   }
-  double most_mm_s = 2.0 * limits.max_velocity_mm_s;
-  const Motors motors(kinematics.type, printer.firmware);
+  const Motors moved = motors();
+  double most_mm_s = 2.0 * moved.gain_of_xy() * limits.max_velocity_mm_s;
   for (std::size_t i = 0; i < Motors::kCount; ++i) {
-    if (motors.moves_xy(i) && printer.steps_per_mm[i]) {
+    if (moved.moves_xy(i) && printer.steps_per_mm[i]) {
       most_mm_s = std::min(most_mm_s, step_limits().max_hz / *printer.steps_per_mm[i]);
     }
   }

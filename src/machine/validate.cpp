@@ -284,8 +284,40 @@ Status check_kinematics(const Draft& draft) {
         return refuse("Klipper alone has");
       }
       return {};
+    case Kinematics::tripteron:
+    case Kinematics::linear:
+      return s.spec().printers.takes_a_matrix ? Status{}
+                                              : refuse("takes a matrix that this firmware lacks");
   }
   return {};
+}
+
+constexpr std::array<std::string_view, Motors::kCount> kJoints = {
+    "kinematics.joint_a", "kinematics.joint_b", "kinematics.joint_c"};
+
+// Checks the rows of a linear machine.
+Status check_joints(const Draft& draft) {
+  const KinematicsSettings& kinematics = draft.settings.kinematics;
+  const bool is_linear = kinematics.type == Kinematics::linear;
+  const bool takes_rows = is_linear || kinematics.type == Kinematics::tripteron;
+  for (std::size_t i = 0; i < kJoints.size(); ++i) {
+    if (kinematics.joints[i] && !takes_rows) {
+      return conflict(draft, {kJoints[i], "kinematics.type"},
+                      fmt::format("{} is given, but kinematics.type is \"{}\", whose motors are "
+                                  "known; take one of them away, or make the type \"linear\"",
+                                  kJoints[i], to_string(kinematics.type)));
+    }
+    if (is_linear && !kinematics.joints[i]) {
+      return conflict(draft, {"kinematics.type"},
+                      fmt::format("kinematics.type is \"linear\", so {} must be given: the travel "
+                                  "of a motor per mm of X, of Y and of Z",
+                                  kJoints[i]));
+    }
+  }
+  const std::optional<std::string> fault = Motors::fault(draft.settings.motors().rows());
+  return fault ? Status(conflict(draft, {kJoints[0], kJoints[1], kJoints[2], "kinematics.type"},
+                                 fmt::format("no machine can have these motors: {}", *fault)))
+               : Status{};
 }
 
 Status check_base(const Draft& draft) {
@@ -435,8 +467,8 @@ Status resolve_dynamics(Draft& draft) {
 }
 
 Status check_consistency(const Draft& draft) {
-  for (auto* check : {check_printer, check_shaper, check_kinematics, check_base, check_emission,
-                      check_second, check_timing, check_grid}) {
+  for (auto* check : {check_printer, check_shaper, check_kinematics, check_joints, check_base,
+                      check_emission, check_second, check_timing, check_grid}) {
     if (Status checked = check(draft); !checked) {
       return checked;
     }

@@ -104,7 +104,7 @@ std::string Admission::refusal(const RunJob& job, double asked_accel_mm_s2) cons
   if (job.piece.cut_off) {
     return "too many lines without motion stand in a row in the middle of the motion";
   }
-  const double accel = largest_motor_accel(job.piece.moves, rules_->verify.fixed.motors());
+  const double accel = largest_motor_accel(job.piece.moves, rules_->verify.fixed.motors);
   const double most_mm_s2 = settings_->base_max_accel_mm_s2(asked_accel_mm_s2);
   if (accel > kRounding * most_mm_s2) {
     return fmt::format(

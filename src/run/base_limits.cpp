@@ -33,9 +33,7 @@ double accel_by_turns(const machine::Settings& settings, double asked_mm_s2) {
 
 }  // namespace
 
-bool shares_motors(const machine::Settings& settings) {
-  return Motors(settings.kinematics.type, settings.printer.firmware).shared_by_xy();
-}
+bool shares_motors(const machine::Settings& settings) { return settings.motors().shared_by_xy(); }
 
 double accel_by_lines_mm_s2(const machine::Settings& settings) {
   return machine::grid_mm(settings) <= machine::kGrid_mm
@@ -59,7 +57,7 @@ double planned_base_accel_mm_s2(const machine::Settings& settings, double asked_
   const double limit = std::min(
       {settings.base_max_accel_mm_s2(asked_mm_s2), accel_by_lines_mm_s2(settings), by_turns});
   const double axes =
-      shares_motors(settings) ? 2.0 : 1.0;  // number of axes whose rounding a motor gets
+      settings.motors().gain_of_both();  // the rounding of X and Y that a motor gets
   const double share = settings.is_timing_free() ? kAccelShareOfFreeTiming : kAccelShare;
   return share * limit -
          std::min(2.0 * axes * machine::grid_mm(settings) / (shortest_s * shortest_s), 0.2 * limit);

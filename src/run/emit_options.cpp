@@ -60,7 +60,7 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
   options.lines.first_step_s = planner::first_step_s(options.fixed);
   options.lines.max_speed_step_mm_s = settings.emit.max_speed_step_mm_s;
   options.lines.max_accel_mm_s2 = planned_base_accel_mm_s2(settings, 0.0);
-  options.lines.motors = options.fixed.motors();
+  options.lines.motors = options.fixed.motors;
   options.version = std::move(version);
   options.checkpoints = settings.emit.checkpoints;
   return options;

@@ -61,11 +61,11 @@ compensate::AxisSetup axis_setup(const machine::AxisDynamics& dynamics,
   compensate::AxisSetup setup;
   setup.axis = machine::flexible_axis(dynamics);
   setup.plants = plants(dynamics, settings);
-  setup.limits.max_velocity_mm_s = settings.base_max_velocity_mm_s();
-  setup.limits.max_accel_mm_s2 = planned_base_accel_mm_s2(settings, 0.0);
+  const Motors motors = settings.motors();
+  setup.limits.max_velocity_mm_s = settings.base_max_velocity_mm_s() / motors.gain_of_xy();
+  setup.limits.max_accel_mm_s2 = planned_base_accel_mm_s2(settings, 0.0) / motors.gain_of_xy();
   if (settings.base.max_jerk_mm_s3 > 0.0) {
-    setup.limits.max_jerk_mm_s3 =
-        settings.base.max_jerk_mm_s3 / (shares_motors(settings) ? 2.0 : 1.0);
+    setup.limits.max_jerk_mm_s3 = settings.base.max_jerk_mm_s3 / motors.gain_of_both();
   }
   if (travel) {
     setup.limits.min_position_mm = travel->min;
@@ -185,8 +185,11 @@ RunSetup setup_for(const compensate::Setup& setup, const Piece& run,
   result.accel = {planned_base_accel_mm_s2(settings, result.asked_accel_mm_s2, !swings),
                   settings.emit_accel_mm_s2(result.asked_accel_mm_s2)};
   result.accel_by_lines_mm_s2 = accel_by_lines_mm_s2(settings);
+  const double gain = settings.motors().gain_of_xy();
   for_each_axis(
-      [&](compensate::AxisSetup& axis) { axis.limits.max_accel_mm_s2 = result.accel.base_mm_s2; },
+      [&](compensate::AxisSetup& axis) {
+        axis.limits.max_accel_mm_s2 = result.accel.base_mm_s2 / gain;
+      },
       result.setup);
   for (std::size_t axis = 0; axis < XY::kCount; ++axis) {
     const bool above = std::ranges::all_of(run.moves, [&](const planner::PlannedMove& move) {

@@ -48,7 +48,7 @@ class Excursion {
 class BaseCheck {
  public:
   BaseCheck(const Rules& rules, Violations& violations)
-      : rules_(&rules), violations_(&violations), motors_(rules.fixed.motors()) {}
+      : rules_(&rules), violations_(&violations), motors_(rules.fixed.motors) {}
 
   void begin_run();
   // Begins in the middle of a run, after the move `before`.

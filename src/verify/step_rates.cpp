@@ -39,14 +39,12 @@ bool is_above(const StepRate& rate, double limit_hz) {
   return rate.hz > (1.0 + kLimitTolerance) * limit_hz;
 }
 
-}  // namespace
-
-std::array<std::string_view, kStepMotors> step_motor_names(Kinematics kinematics) {
-  if (kinematics == Kinematics::corexy) {
-    return {"A", "B", "Z", "E"};
-  }
-  return {"X", "Y", "Z", "E"};
+std::array<std::string_view, kStepMotors> names_of(const Motors& motors) {
+  const auto& [a, b, c] = motors.names();
+  return {a, b, c, "E"};
 }
+
+}  // namespace
 
 bool StepRules::is_known() const {
   return std::ranges::any_of(steps_per_mm, [](double steps) { return steps > 0.0; });
@@ -54,9 +52,9 @@ bool StepRules::is_known() const {
 
 StepGauge::StepGauge(const planner::FirmwareConfig& fixed, const StepRules& rules)
     : rules_(rules),
-      motors_(fixed.motors()),
+      motors_(fixed.motors),
       is_known_(rules.is_known()),
-      none_{step_motor_names(fixed.kinematics), rules.steps_per_mm, {}, {}, {}},
+      none_{names_of(motors_), rules.steps_per_mm, {}, {}, {}},
       largest_(none_),
       certain_(none_) {}
 

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <numbers>
 #include <random>
 
 namespace unflex {
@@ -57,6 +59,110 @@ TEST(MotorsOf, AnyMachineTellWhereItIs) {
       }
     }
   }
+}
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+
+void expect_row(const Motors::Row& row, const Motors::Row& expected) {
+  for (std::size_t axis = 0; axis < row.size(); ++axis) {
+    EXPECT_NEAR(row[axis], expected[axis], 1e-6) << "axis " << axis;
+  }
+}
+
+// A leg's plane is n·(T − S) = 0, so a tool at T needs its slider where the plane meets the rail.
+TEST(ARail, GivesTheRowOfItsPlane) {
+  expect_row(row_of_rail(45.0 * kDegree, 0.0, true), {1.0, 0.0, -1.0});
+  expect_row(row_of_rail(45.0 * kDegree, 45.0 * kDegree, true), {1.0, 1.0, -1.41421356});
+  expect_row(row_of_rail(45.0 * kDegree, 30.0 * kDegree, true), {1.0, 0.57735027, -1.15470054});
+  const double diagonal = 54.735610317245346 * kDegree;
+  expect_row(row_of_rail(diagonal, 45.0 * kDegree, true), {1.0, 1.0, -1.0});
+  expect_row(row_of_rail(45.0 * kDegree, 0.0, false), {1.0, 0.0, 1.0});
+}
+
+TEST(ARail, HasItsSliderInThePlaneOfTheLeg) {
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> place(-100.0, 100.0);
+  std::uniform_real_distribution<double> unit(0.05, 0.95);
+  for (int i = 0; i < 200; ++i) {
+    const double tilt = unit(random) * std::numbers::pi / 2.0;
+    const double azimuth = (2.0 * unit(random) - 1.0) * 0.45 * std::numbers::pi;
+    const Motors::Row row = row_of_rail(tilt, azimuth, true);
+    const double n[3] = {std::sin(tilt) * std::cos(azimuth), std::sin(tilt) * std::sin(azimuth),
+                         -std::cos(tilt)};
+    const double tool[3] = {place(random), place(random), place(random)};
+    // The rail passes through the origin.
+    const double slider = row[0] * tool[0] + row[1] * tool[1] + row[2] * tool[2];
+    EXPECT_NEAR(n[0] * (tool[0] - slider) + n[1] * tool[1] + n[2] * tool[2], 0.0, 1e-10);
+  }
+}
+
+TEST(ATripteron, HasItsSlidersWhereTheToolNeedsThem) {
+  const Motors motors(Kinematics::tripteron, Firmware::klipper);
+  struct Case {
+    std::array<double, 3> tool;
+    std::array<double, 3> sliders;
+  };
+  for (const Case& at : {Case{{250, 0, 100}, {150, 150, 350}}, Case{{250, 75, 100}, {225, 75, 350}},
+                         Case{{350, 0, 250}, {100, 100, 600}}, Case{{300, 0, 100}, {200, 200, 400}},
+                         Case{{10, 20, 30}, {0, -40, 40}}}) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      EXPECT_DOUBLE_EQ(motors.of(i, at.tool), at.sliders[i]);
+    }
+  }
+  EXPECT_TRUE(motors.shared_by_xy());
+  EXPECT_EQ(motors.names()[2], "C");
+  const Motors::Rows inverse = motors.inverse();
+  expect_row(inverse[0], {0.25, 0.25, 0.5});
+  expect_row(inverse[1], {0.5, -0.5, 0.0});
+  expect_row(inverse[2], {-0.25, -0.25, 0.5});
+}
+
+// Speeds of the sliders per unit of the tool's speed along u.
+TEST(ATripteron, MovesItsSlidersByTheDirection) {
+  const Motors motors(Kinematics::tripteron, Firmware::klipper);
+  const double half = std::sqrt(0.5);
+  const double third = 1.0 / std::sqrt(3.0);
+  const auto speeds = [&](double x, double y, double z) {
+    return Motors::Row{motors.of(0, x, y, z), motors.of(1, x, y, z), motors.of(2, x, y, z)};
+  };
+  expect_row(speeds(1, 0, 0), {1, 1, 1});
+  expect_row(speeds(0, 1, 0), {1, -1, 0});
+  expect_row(speeds(0, 0, 1), {-1, -1, 1});
+  expect_row(speeds(half, half, 0), {1.41421356, 0, 0.70710678});
+  expect_row(speeds(third, third, third), {0.57735027, -0.57735027, 1.15470054});
+  EXPECT_NEAR(300.0 / motors.largest_of_xy({half, half}), 212.132, 1e-3);
+}
+
+TEST(AMatrix, MustMoveAllAxesIndependently) {
+  const auto rows_of = [](Kinematics kinematics) {
+    return Motors(kinematics, Firmware::klipper).rows();
+  };
+  for (const Kinematics kinematics : all_kinematics()) {
+    EXPECT_FALSE(Motors::fault(rows_of(kinematics))) << to_string(kinematics);
+  }
+  EXPECT_TRUE(Motors::fault({{{1, 1, 0}, {2, 2, 0}, {0, 0, 1}}}));
+  EXPECT_TRUE(Motors::fault({{{1, 0, 0}, {0, 1, 0}, {0, 0, 0}}}));
+  EXPECT_TRUE(Motors::fault({{{0.1, 0, 0}, {0, 0.1, 0}, {0, 0, 0.09}}})) << "determinant 9e-4";
+  EXPECT_FALSE(Motors::fault({{{0.1, 0, 0}, {0, 0.1, 0}, {0, 0, 0.11}}}));
+}
+
+// Turning the axes changes neither singular value.
+TEST(AMatrix, MayTakeTwentyTimesTheTravelOneWay) {
+  const double c = std::cos(0.3);
+  const double s = std::sin(0.3);
+  EXPECT_FALSE(Motors::fault({{{c, s, 0}, {-s, c, 0}, {0, 0, 19.9}}}));
+  EXPECT_TRUE(Motors::fault({{{c, s, 0}, {-s, c, 0}, {0, 0, 20.1}}}));
+  EXPECT_FALSE(Motors::fault({{{19.9 * c, 19.9 * s, 0}, {-s, c, 0}, {0, 0, 5}}}));
+  EXPECT_TRUE(Motors::fault({{{20.1 * c, 20.1 * s, 0}, {-s, c, 0}, {0, 0, 5}}}));
+}
+
+TEST(AMatrix, TellsHowFarMotorsGo) {
+  const Motors motors(Motors::Rows{{{2, 0, 0}, {0.5, -1, 0}, {0, 0, 1}}});
+  EXPECT_DOUBLE_EQ(motors.gain_of_xy(), 2.0);
+  EXPECT_DOUBLE_EQ(motors.gain_of_both(), 2.0);
+  const Motors core(Kinematics::corexy, Firmware::rrf);
+  EXPECT_DOUBLE_EQ(core.gain_of_xy(), 1.0);
+  EXPECT_DOUBLE_EQ(core.gain_of_both(), 2.0);
 }
 
 }  // namespace

@@ -66,7 +66,10 @@ TEST_P(SharedMotorsOf, KeepTheirLimitsAtLittleCost) {
   const Case& tested = GetParam();
   const std::string text = beginning(tested.print, tested.lines);
   const report::Report shared = compensated(text, tested.kinematics, tested.overrides);
-  const report::Report own = compensated(text, "cartesian", tested.overrides);
+  std::vector<std::string> without_joints = tested.overrides;
+  std::erase_if(without_joints,
+                [](const std::string& one) { return one.starts_with("kinematics.joint"); });
+  const report::Report own = compensated(text, "cartesian", without_joints);
   EXPECT_LE(shared.measured.base.max_accel_mm_s2, (1.001 + tested.room) * kMaxAccel_mm_s2);
   EXPECT_LE(shared.measured.compensated.extruding.contour_rms_mm,
             tested.cost * own.measured.compensated.extruding.contour_rms_mm);
@@ -87,8 +90,42 @@ INSTANTIATE_TEST_SUITE_P(
              0.02,
              1.5},
         Case{"KlipperHybrid", "hybrid_corexy", "pipeline_star.gcode", 600, {}, 0.02, 1.2},
-        Case{"KlipperCorexz", "corexz", "pipeline_vase.gcode", 300, {}, 0.02, 1.15}),
+        Case{"KlipperCorexz", "corexz", "pipeline_vase.gcode", 300, {}, 0.02, 1.15},
+        Case{"KlipperTripteron", "tripteron", "pipeline_star.gcode", 600, {}, 0.02, 1.2},
+        Case{"RrfTripteron",
+             "tripteron",
+             "pipeline_star.gcode",
+             600,
+             {"printer.firmware=rrf", "limits.max_z_accel_mm_s2=20000",
+              "limits.max_z_velocity_mm_s=300"},
+             0.05,
+             1.6},
+        // The belts are geared, so that motors turn twice as far for X.
+        Case{"KlipperGeared",
+             "linear",
+             "pipeline_star.gcode",
+             600,
+             {"kinematics.joint_a=[2, 1, 0]", "kinematics.joint_b=[2, -1, 0]",
+              "kinematics.joint_c=[0, 0, 1]"},
+             0.02,
+             2.0}),
     [](const auto& tested) { return tested.param.name; });
+
+// The matrix of a CoreXY is a CoreXY.
+TEST(AMatrix, MakesWhatTheMachineMakesThatItIs) {
+  const std::string text = beginning("pipeline_star.gcode", 600);
+  const auto written = [&](std::vector<std::string> overrides) {
+    overrides.push_back("base.max_accel_mm_s2=20000");
+    const JobFolder folder(text, overrides);
+    SilentProgress progress;
+    const Result<report::Report> report = compensate(folder.job(2), progress);
+    EXPECT_TRUE(report.has_value()) << to_string(report.error());
+    return folder.output();
+  };
+  EXPECT_EQ(written({"kinematics.type=linear", "kinematics.joint_a=[1, 1, 0]",
+                     "kinematics.joint_b=[1, -1, 0]", "kinematics.joint_c=[0, 0, 1]"}),
+            written({"kinematics.type=corexy"}));
+}
 
 }  // namespace
 }  // namespace unflex::flow

@@ -333,12 +333,33 @@ TEST(RrfConfig, TellsTheKinematics) {
   }
 }
 
+// CoreKinematics.cpp, Configure: behind each axis the factors of the motors, 0 for those not named.
+TEST(RrfConfig, TellsAMatrixOfMotors) {
+  const auto machine = [](const std::string& lines) {
+    return read("M550 P\"x\"\n" + lines, "config.g");
+  };
+  const Settings tripteron = machine("M669 X1:1:1 Y1:-1:0 Z-1:-1:1\n");
+  EXPECT_EQ(tripteron.kinematics.type, Kinematics::tripteron);
+  const Settings core = machine("M669 K0\nM669 X1:1:0 Y1:-1:0\n");
+  EXPECT_EQ(core.kinematics.type, Kinematics::corexy);
+  const Settings geared = machine("M669 K1 Y2:-2\n");
+  EXPECT_EQ(geared.kinematics.type, Kinematics::linear);
+  EXPECT_EQ(geared.motors().rows(),
+            (Motors::Rows{{{1.0, 2.0, 0.0}, {1.0, -2.0, 0.0}, {0.0, 0.0, 1.0}}}));
+  EXPECT_EQ(told(geared, "kinematics.joint_b"), "[1, -2, 0] config.g:2");
+  const Settings reset = machine("M669 X1:1:0 Y2:-2:0\nM669 K1\n");
+  EXPECT_EQ(reset.kinematics.type, Kinematics::corexy);
+  EXPECT_FALSE(reset.kinematics.joints[0]);
+}
+
 TEST(RrfConfig, OfOtherMachinesIsRefused) {
   for (const auto& [line, reason] :
        {std::pair{"M669 K4", "kinematics K4 is a machine that unflex does not support yet"},
         std::pair{"M669 K3", "kinematics K3"}, std::pair{"M669 K12", "kinematics K12"},
         std::pair{"M665 L200 R100", "M665 makes this machine a delta"},
-        std::pair{"M669 X1:1:0 Y1:-1:0", "M669 gives a matrix of its own"}}) {
+        std::pair{"M669 X1:y", "M669 X gives motor 1 the factor '', which is no number"},
+        std::pair{"M669 X1:1:0:0.5", "M669 X gives motor 3 the factor '0.5', which is more motors"},
+        std::pair{"M669 X1:1 Y2:2", "no machine can have these motors"}}) {
     const Result<Settings> settings =
         parse(std::string("M550 P\"x\"\n") + line + "\n", "config.g", {});
     ASSERT_FALSE(settings) << line;

@@ -45,7 +45,7 @@ std::vector<PlannedMove> rrf_plan(const std::vector<gcode::Segment>& segments, c
 // At 45° one motor of a CoreXY moves √2 times the length, and the other stands.
 TEST(MarlinOnACoreXy, LimitsMotors) {
   FirmwareConfig core = marlin_config();
-  core.kinematics = Kinematics::corexy;
+  core.motors = Motors(Kinematics::corexy, core.firmware);
   Limits limits = marlin_limits();
   limits.axis_max_accel_mm_s2 = {5000.0, 5000.0, 100.0, 10000.0};
   limits.axis_max_velocity_mm_s = {200.0, 200.0, 10.0, 100.0};
@@ -69,7 +69,7 @@ TEST(MarlinOnACoreXy, LimitsMotors) {
 // A right angle in X and Y turns the motors by as much: from A = B to A = −B.
 TEST(MarlinOnACoreXy, JoinsLinesByTheirMotorsDirections) {
   FirmwareConfig core = marlin_config();
-  core.kinematics = Kinematics::corexy;
+  core.motors = Motors(Kinematics::corexy, core.firmware);
   Limits limits = marlin_limits();
   limits.print_accel_mm_s2 = limits.travel_accel_mm_s2 = 1000.0;
   const auto corner = [&](const FirmwareConfig& config) {
@@ -95,7 +95,7 @@ TEST(MarlinOnACoreXy, JoinsLinesByTheirMotorsDirections) {
 
 TEST(MarlinOnACoreXy, CountsMotorsStepsForTheShortestLine) {
   FirmwareConfig core = marlin_config();
-  core.kinematics = Kinematics::corexy;
+  core.motors = Motors(Kinematics::corexy, core.firmware);
   // Three steps along both axes are six of one motor.
   const auto moves = polyline({{3.0 / 80.0, 3.0 / 80.0, 0.0, 0.0}}, 50.0);
   EXPECT_EQ(marlin_plan(moves, marlin_limits(), core).size(), 1U);
@@ -104,7 +104,7 @@ TEST(MarlinOnACoreXy, CountsMotorsStepsForTheShortestLine) {
 
 TEST(RrfOnACoreXy, LimitsMotorsToo) {
   FirmwareConfig core = rrf_config();
-  core.kinematics = Kinematics::corexy;
+  core.motors = Motors(Kinematics::corexy, core.firmware);
   Limits limits = fast_limits();
   limits.axis_max_accel_mm_s2 = {5000.0, 5000.0, 200.0, 5000.0};
   const double half = std::sqrt(0.5);
@@ -122,7 +122,7 @@ TEST(RrfOnACoreXy, LimitsMotorsToo) {
 // those of a motor that X needs.
 TEST(RrfOnACoreXz, LimitsXByZsMotor) {
   FirmwareConfig core = rrf_config();
-  core.kinematics = Kinematics::corexz;
+  core.motors = Motors(Kinematics::corexz, core.firmware);
   const auto line = [&](gcode::Position to) {
     return rrf_plan(polyline({to}, 1000.0), fast_limits(), core).at(0);
   };
@@ -132,9 +132,36 @@ TEST(RrfOnACoreXz, LimitsXByZsMotor) {
   EXPECT_NEAR(line({0, 0, 50, 0}).accel_mm_s2, 200.0 / 3.0, 0.01);
 }
 
+// CoreKinematics.cpp: motor i is held to the limits of axis i, for the directions without signs. So
+// Z's limits are those of the slider C, which X needs and Y does not.
+TEST(RrfOnATripteron, LimitsEachSlider) {
+  FirmwareConfig machine = rrf_config();
+  machine.motors = Motors(Kinematics::tripteron, machine.firmware);
+  const auto accel_mm_s2 = [&](gcode::Position to) {
+    return rrf_plan(polyline({to}, 1000.0), fast_limits(), machine).at(0).accel_mm_s2;
+  };
+  EXPECT_NEAR(accel_mm_s2({50, 0, 0, 0}), 200.0, 0.01);
+  EXPECT_NEAR(accel_mm_s2({0, 50, 0, 0}), 3000.0, 0.1);
+  EXPECT_NEAR(accel_mm_s2({50, 50, 0, 0}), 200.0 * std::sqrt(2.0), 0.1);
+}
+
+TEST(RrfOnATripteron, IsWhereItsMotorsStepsAre) {
+  FirmwareConfig machine = rrf_config();
+  machine.motors = Motors(Kinematics::tripteron, machine.firmware);
+  machine.steps_per_mm = {80.0, 80.0, 80.0, 420.0};
+  const PlannedMove move =
+      rrf_plan(polyline({{10.0 + 0.4 / 80.0, 5.0 + 0.3 / 80.0, 0.0, 0.0}}, 50.0), fast_limits(),
+               machine)
+          .at(0);
+  // The sliders are at 1200.7, 400.1 and 800.4 steps: 1201, 400 and 800.
+  EXPECT_NEAR(move.segment.end_mm[X], 0.25 * (1201.0 + 400.0 + 2.0 * 800.0) / 80.0, 1e-9);
+  EXPECT_NEAR(move.segment.end_mm[Y], 0.5 * (1201.0 - 400.0) / 80.0, 1e-9);
+  EXPECT_NEAR(move.segment.end_mm[Z], 0.25 * (-1201.0 - 400.0 + 2.0 * 800.0) / 80.0, 1e-9);
+}
+
 TEST(RrfOnACoreXy, IsWhereItsMotorsStepsAre) {
   FirmwareConfig core = rrf_config();
-  core.kinematics = Kinematics::corexy;
+  core.motors = Motors(Kinematics::corexy, core.firmware);
   core.steps_per_mm = {80.0, 80.0, 400.0, 420.0};
   const PlannedMove move =
       rrf_plan(polyline({{10.0 + 0.4 / 80.0, 5.0 + 0.3 / 80.0, 0.0, 0.0}}, 50.0), fast_limits(),
@@ -148,7 +175,7 @@ TEST(RrfOnACoreXy, IsWhereItsMotorsStepsAre) {
 // Klipper limits only the tool, not the motors (klippy/toolhead.py).
 TEST(KlipperOnACoreXy, PlansAsOnAnyMachine) {
   FirmwareConfig core;
-  core.kinematics = Kinematics::corexy;
+  core.motors = Motors(Kinematics::corexy, core.firmware);
   EXPECT_EQ(testing::plan(polyline({{50, 50, 0, 0}}, 1000.0), Limits{}, core).at(0).accel_mm_s2,
             5000.0);
 }

@@ -33,7 +33,7 @@ planner::PlannedMove even_move(double x_mm_s, double y_mm_s, double z_mm_s) {
 std::string broken(Kinematics kinematics, const planner::PlannedMove& move, double max_velocity,
                    double max_accel) {
   Rules rules;
-  rules.fixed.kinematics = kinematics;
+  rules.fixed.motors = Motors(kinematics, rules.fixed.firmware);
   rules.base_max_velocity_mm_s = max_velocity;
   rules.base_max_accel_mm_s2 = max_accel;
   return broken_rule({move}, {move}, rules).value_or("");

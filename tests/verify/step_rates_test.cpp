@@ -17,7 +17,7 @@ using ::testing::SizeIs;
 
 planner::FirmwareConfig machine_of(Kinematics kinematics) {
   planner::FirmwareConfig fixed;
-  fixed.kinematics = kinematics;
+  fixed.motors = Motors(kinematics, fixed.firmware);
   return fixed;
 }
 

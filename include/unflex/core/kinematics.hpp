@@ -6,7 +6,9 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 
 #include "unflex/core/axes.hpp"
@@ -21,10 +23,12 @@ enum class Kinematics {
   hybrid_corexy,
   hybrid_corexy_inverted,  // the belt of X goes around the other way
   hybrid_corexz,
+  tripteron,  // three parallel rails along X, and on each a leg that stays in a plane
+  linear,     // any other linear map
 };
 
 // As the configuration spells it, which is Klipper's way: "cartesian", "corexy", "corexz",
-// "hybrid_corexy", "hybrid_corexy_inverted", "hybrid_corexz".
+// "hybrid_corexy", "hybrid_corexy_inverted", "hybrid_corexz"; and "tripteron", "linear".
 [[nodiscard]] std::string_view to_string(Kinematics kinematics);
 
 // All kinematics, in the order of the enumeration.
@@ -34,16 +38,33 @@ enum class Kinematics {
 class Motors {
  public:
   static constexpr std::size_t kCount = 3;
-  using Rows = std::array<std::array<double, kCount>, kCount>;
+  using Row = std::array<double, kCount>;
+  using Rows = std::array<Row, kCount>;
 
   // Each axis has a motor of its own.
   Motors() = default;
+  // The motors "A", "B" and "C" of any linear machine. fault(rows) must be nullopt.
+  explicit Motors(const Rows& rows);
   // Klipper: klippy/kinematics; Marlin 2.1: src/module/planner.cpp, _populate_block;
   // RepRapFirmware 3.5: src/Movement/Kinematics/CoreKinematics.cpp, whose coreXZ turns a motor
-  // three times as far for Z as for X.
+  // three times as far for Z as for X. A linear machine has no rows of its own: it is cartesian
+  // here.
+  //
+  // The planes of a tripteron's legs are such that A and B do X + Y − Z and X − Y − Z, and C does
+  // X + Z.
   Motors(Kinematics kinematics, Firmware firmware);
 
+  // Why no machine can have these rows; nullopt if it can. The rows must be independent, and not
+  // nearly dependent: the determinant at least 1e-3, and the largest singular value at most 20
+  // times the smallest.
+  [[nodiscard]] static std::optional<std::string> fault(const Rows& rows);
+
   [[nodiscard]] const Rows& rows() const { return rows_; }
+  // The map from motors to axes: axes by motors.
+  [[nodiscard]] Rows inverse() const;
+  // "X", "Y" and "Z"; "A" and "B" for a CoreXY's belts; "A", "B" and "C" for a tripteron and for
+  // other linear machines.
+  [[nodiscard]] const std::array<std::string_view, kCount>& names() const { return names_; }
 
   // Whether motor i has a part in moving X or Y.
   [[nodiscard]] bool moves_xy(std::size_t i) const {
@@ -67,6 +88,10 @@ class Motors {
 
   // The largest magnitude of motion of any motor of X or Y, for the motion x, y, z of the axes.
   [[nodiscard]] double largest_of_xy(const Axes<double>& xy, double z = 0.0) const;
+  // The most that a motor moves per motion of X alone, or of Y alone: 1 where belts are not geared.
+  [[nodiscard]] double gain_of_xy() const;
+  // The most that a motor moves if X and Y both move by 1.
+  [[nodiscard]] double gain_of_both() const;
   // The uncertainty of motor i if every axis has an uncertainty of 1.
   [[nodiscard]] double uncertainty(std::size_t i) const {
     return std::abs(rows_[i][0]) + std::abs(rows_[i][1]) + std::abs(rows_[i][2]);
@@ -74,6 +99,16 @@ class Motors {
 
  private:
   Rows rows_{{{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}}};
+  std::array<std::string_view, kCount> names_{"X", "Y", "Z"};
 };
+
+// The row of a motor whose slider runs on a rail along X and carries a leg of two bars. The joints
+// of the leg have parallel axes, so the bars stay in a plane that travels with the slider: n·(T −
+// S) = 0, with the plane's normal n, the slider S and the leg's end T. The plane is tilted against
+// the horizontal by tilt_rad, in (0, π/2), and its normal is turned against the rail by
+// azimuth_rad, in (−π/2, π/2). leans_back: the slider lies towards −X below the tool.
+//
+//   row = (1, tan ψ, ∓ cot τ / cos ψ)     τ  tilt     ψ  azimuth     −: leans_back
+[[nodiscard]] Motors::Row row_of_rail(double tilt_rad, double azimuth_rad, bool leans_back);
 
 }  // namespace unflex

@@ -246,11 +246,14 @@ struct SecondSettings {
 
 struct KinematicsSettings {
   Kinematics type = Kinematics::cartesian;
+  // Travel of each motor per mm of X, Y and Z. Only for the types "linear", where all must be set,
+  // and "tripteron", whose own rows are in force while these are unset.
+  std::array<std::optional<Motors::Row>, Motors::kCount> joints;
 };
 
 // Limits of each motor.
 struct BaseSettings {
-  std::optional<double> max_velocity_mm_s;  // unset: 2 · limits.max_velocity_mm_s
+  std::optional<double> max_velocity_mm_s;  // unset: Settings::base_max_velocity_mm_s()
   // Unset: 2 · Settings::most_of_motor() · limits.max_accel_mm_s2.
   std::optional<double> max_accel_mm_s2;
   double max_jerk_mm_s3 = 0.0;  // 0: not limited
@@ -403,7 +406,9 @@ struct Settings {
   [[nodiscard]] bool printer_presses() const;
   // Whether runs press filament together as the hotend needs it.
   [[nodiscard]] bool writes_pressure() const;
-  // The most that the plan may ask of a motor of X and Y, relative to the limits. Klipper limits
+  // The motors of `kinematics`.
+  [[nodiscard]] Motors motors() const;
+  // A bound of what the plan may ask of a motor of X and Y, relative to the limits. Klipper limits
   // what the tool does, the other firmwares what the motors do.
   [[nodiscard]] double most_of_motor() const;
   // The limits of a motor of X and Y by the printer's own limits, and the key that sets the

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <optional>
 
+#include "generic_cartesian.hpp"
 #include "klipper_config.hpp"
 #include "klipper_reader.hpp"
 #include "klipper_shaper.hpp"
@@ -233,9 +234,12 @@ class Reader {
       return fail(
           ErrorKind::usage, given.place,
           fmt::format("unflex does not support kinematics '{}' yet, only cartesian, corexy, "
-                      "corexz, hybrid_corexy and hybrid_corexz; print the sliced file as "
-                      "it is on this machine",
+                      "corexz, hybrid_corexy, hybrid_corexz and generic_cartesian; print the "
+                      "sliced file as it is on this machine",
                       given.text));
+    }
+    if (given.text == "generic_cartesian") {
+      return carriages(given);
     }
     const KlipperOption* const inverted = option(known->name, "inverted");
     const bool is_inverted = inverted != nullptr && is_true(inverted->text);
@@ -244,30 +248,38 @@ class Reader {
         is_hybrid && is_inverted ? Kinematics::hybrid_corexy_inverted : known->type;
     reading_.add("kinematics.type", std::string(to_string(type)),
                  is_hybrid && is_inverted ? inverted->place : given.place);
-    return own_carriages();
+    return {};
   }
 
-  // generic_cartesian: whether each stepper moves one carriage, as far as steppers are there.
-  [[nodiscard]] Status own_carriages() const {
-    bool any = false;
-    for (const auto& [name, section] : config_->sections) {
-      const KlipperOption* const moves =
-          name.starts_with("stepper ") ? section.find("carriages") : nullptr;
-      any = any || moves != nullptr;
-      if (moves != nullptr && moves->text.find_first_of("+-*") != std::string::npos) {
-        return fail(ErrorKind::usage, moves->place,
-                    fmt::format("[{}] moves several carriages, '{}', which unflex does not "
-                                "understand; give a printer file of unflex, with kinematics.type "
-                                "= \"corexy\" or what it is (unflex printer init writes "
-                                "one)",
-                                name, moves->text));
-      }
+  // generic_cartesian: the motors are told by the carriages that each stepper moves.
+  Status carriages(const KlipperOption& given) {
+    const Result<std::vector<GenericMotor>> motors =
+        generic_motors(*config_, reading_.maybe_elsewhere);
+    if (!motors) {
+      return tl::unexpected(motors.error());
     }
-    const KlipperOption& given = *option("printer", "kinematics");
-    if (!any && !config_->missing.empty() && given.text == "generic_cartesian") {
+    if (motors->empty() && !config_->missing.empty()) {
       return fail(ErrorKind::usage, given.place,
                   fmt::format("the steppers of this {} and their carriages are missing{}",
                               given.text, reading_.maybe_elsewhere));
+    }
+    const Kinematics type = kinematics_of(*motors);
+    reading_.add("kinematics.type", std::string(to_string(type)), given.place);
+    if (type != Kinematics::linear) {
+      return {};
+    }
+    if (motors->size() != Motors::kCount) {
+      return fail(
+          ErrorKind::usage, given.place,
+          fmt::format("its steppers make {} different sums of carriages, and unflex knows machines "
+                      "with three{}",
+                      motors->size(), reading_.maybe_elsewhere));
+    }
+    for (std::size_t i = 0; i < motors->size(); ++i) {
+      const GenericMotor& motor = (*motors)[i];
+      reading_.add(fmt::format("kinematics.joint_{}", "abc"[i]),
+                   std::vector<Value>(motor.row.begin(), motor.row.end()), motor.place);
+      steps_per_mm(motor.section, fmt::format("printer.{}_steps_per_mm", "xyz"[i]));
     }
     return {};
   }
@@ -343,11 +355,10 @@ class Reader {
     }
   }
 
-  // generic_cartesian names carriages instead of steppers.
+  // generic_cartesian has carriages instead of steppers.
   [[nodiscard]] std::string rail_of(const std::string& axis) const {
     for (const auto& [name, section] : config_->sections) {
-      const KlipperOption* const moves = section.find("axis");
-      if (name.starts_with("carriage ") && moves != nullptr && moves->text == axis) {
+      if (name.starts_with("carriage ") && axis_of_carriage(name, section) == axis[0] - 'x') {
         return name;
       }
     }

@@ -42,6 +42,8 @@ extern constexpr FirmwareSpec kSpec = {
     .defaults = {.jerk_mm_s = {10.0, 10.0, 0.3, 5.0},
                  .steps_per_mm = {80.0, 80.0, 400.0, 500.0},
                  .unretracts_less = false},
-    .printers = {.has_all_kinematics = true, .lines_from = "Klipper from its own storage"}};
+    .printers = {.has_all_kinematics = true,
+                 .takes_a_matrix = true,
+                 .lines_from = "Klipper from its own storage"}};
 
 }  // namespace unflex::firmware::klipper

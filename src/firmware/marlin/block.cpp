@@ -135,7 +135,7 @@ void limit_accel(const Settings& settings, const Travel& travel, float inverse_l
 
 Settings make_settings(const Limits& limits, const FirmwareConfig& config) {
   Settings s;
-  const Motors motors = config.motors();
+  const Motors& motors = config.motors;
   for (std::size_t motor = 0; motor < s.motors.size(); ++motor) {
     for (const auto axis : gcode::kXYZ) {
       s.motors[motor][axis] = static_cast<int>(motors.rows()[motor][axis]);

@@ -58,6 +58,10 @@ class RrfConfigReader {
  private:
   Status kinematics(const gcode::Command& command, std::string_view arguments,
                     const SourcePlace& place);
+  Status machine_of(int number, bool is_old, const SourcePlace& place);
+  Status matrix(const std::map<char, std::vector<std::string_view>>& values,
+                const SourcePlace& place);
+  void add_kinematics();
   void shaper(const SourcePlace& place);
 
   CommandReader reader_;
@@ -65,6 +69,8 @@ class RrfConfigReader {
   RrfHeaters heaters_;
   RrfSteps steps_;
   bool may_set_shaper_ = false;  // there is an M593, or a file that may have one
+  Motors::Rows joints_ = Motors().rows();
+  std::optional<SourcePlace> kinematics_at_;  // of the last line that changed the motors
 };
 
 Status refuse(const SourcePlace& place, std::string message) {
@@ -132,6 +138,7 @@ Reading RrfConfigReader::finish() {
   if (!may_set_shaper_) {
     reader_.reading.add("printer.input_shaper_freq_x_hz", 0.0, {file(), 0});
   }
+  add_kinematics();
   travel_.add_to(reader_.reading);
   heaters_.add_to(reader_.reading);
   reader_.finish();
@@ -141,28 +148,34 @@ Reading RrfConfigReader::finish() {
 Status RrfConfigReader::kinematics(const gcode::Command& command, std::string_view arguments,
                                    const SourcePlace& place) {
   const std::map<char, std::vector<std::string_view>> values = values_of(arguments);
-  if (values.contains('X') || values.contains('Y') || values.contains('Z')) {
-    return refuse(
-        place,
-        fmt::format("M{} gives a matrix of its own, which unflex does not read; give a printer "
-                    "file of unflex with the kinematics.type that it stands for (unflex printer "
-                    "init writes one)",
-                    command.number));
-  }
   const bool is_old = command.number == 667;
+  const bool has_matrix = values.contains('X') || values.contains('Y') || values.contains('Z');
+  if (is_old && has_matrix) {
+    return refuse(place,
+                  "M667 gives a matrix of its own, which unflex does not read; give the printer "
+                  "M669, which RepRapFirmware has had since 2.03, or kinematics.type and "
+                  "kinematics.joint_a to joint_c in a printer file of unflex");
+  }
   const char letter = is_old ? 'S' : 'K';
-  if (!values.contains(letter)) {
-    return {};
+  if (values.contains(letter)) {
+    const std::optional<double> value = parse_number(values.at(letter).front());
+    if (!value) {
+      note(place,
+           fmt::format("no number behind {}: this line is not taken, since unflex does not "
+                       "evaluate expressions; give kinematics.type with --set",
+                       letter),
+           {"kinematics.type"});
+      return {};
+    }
+    if (const Status known = machine_of(to_int(*value), is_old, place); !known) {
+      return known;
+    }
   }
-  const std::optional<double> value = parse_number(values.at(letter).front());
-  if (!value) {
-    note(place,
-         fmt::format("no number behind {}: this line is not taken, since unflex does not evaluate "
-                     "expressions; give kinematics.type with --set",
-                     letter),
-         {"kinematics.type"});
-    return {};
-  }
+  return is_old ? Status{} : matrix(values, place);
+}
+
+// Makes the machine one of those that the firmware has a number for.
+Status RrfConfigReader::machine_of(int number, bool is_old, const SourcePlace& place) {
   struct Type {
     int number;
     Kinematics kinematics;
@@ -171,14 +184,66 @@ Status RrfConfigReader::kinematics(const gcode::Command& command, std::string_vi
   constexpr std::array kTypes = {Type{0, Kinematics::cartesian}, Type{1, Kinematics::corexy},
                                  Type{2, Kinematics::corexz}, Type{11, Kinematics::hybrid_corexy}};
   constexpr int kLastOfOld = 2;
-  const int number = to_int(*value);
   const auto type = std::ranges::find(kTypes, number, &Type::number);
   if (type == kTypes.end() || (is_old && number > kLastOfOld)) {
-    return refuse(
-        place, fmt::format("kinematics {}{} is a machine that {}", letter, number, kNotSupported));
+    return refuse(place, fmt::format("kinematics {}{} is a machine that {}", is_old ? 'S' : 'K',
+                                     number, kNotSupported));
   }
-  reader_.reading.add("kinematics.type", std::string(to_string(type->kinematics)), place);
+  joints_ = Motors(type->kinematics, Firmware::rrf).rows();
+  kinematics_at_ = place;
   return {};
+}
+
+// Takes a matrix of its own: behind each axis' letter the travel of each motor for it. Motors that
+// are not named there do nothing for that axis (CoreKinematics::Configure).
+Status RrfConfigReader::matrix(const std::map<char, std::vector<std::string_view>>& values,
+                               const SourcePlace& place) {
+  constexpr std::array kAxes = {'X', 'Y', 'Z'};
+  Motors::Rows rows = joints_;
+  for (std::size_t axis = 0; axis < kAxes.size(); ++axis) {
+    const auto given = values.find(kAxes[axis]);
+    if (given == values.end()) {
+      continue;
+    }
+    for (std::size_t motor = 0; motor < rows.size(); ++motor) {
+      rows[motor][axis] = 0.0;
+    }
+    for (std::size_t motor = 0; motor < given->second.size(); ++motor) {
+      const std::optional<double> factor = parse_number(given->second[motor]);
+      if (!factor || (motor >= rows.size() && *factor != 0.0)) {
+        return refuse(place,
+                      fmt::format("M669 {} gives motor {} the factor '{}', which {}", kAxes[axis],
+                                  motor, given->second[motor],
+                                  factor ? "is more motors than unflex knows" : "is no number"));
+      }
+      if (motor < rows.size()) {
+        rows[motor][axis] = *factor;
+      }
+    }
+  }
+  if (rows != joints_) {
+    joints_ = rows;
+    kinematics_at_ = place;
+  }
+  return {};
+}
+
+void RrfConfigReader::add_kinematics() {
+  if (!kinematics_at_) {
+    return;
+  }
+  const auto known = std::ranges::find_if(all_kinematics(), [&](Kinematics kinematics) {
+    return kinematics != Kinematics::linear && Motors(kinematics, Firmware::rrf).rows() == joints_;
+  });
+  const bool is_known = known != all_kinematics().end();
+  reader_.reading.add("kinematics.type",
+                      std::string(to_string(is_known ? *known : Kinematics::linear)),
+                      *kinematics_at_);
+  for (std::size_t motor = 0; !is_known && motor < joints_.size(); ++motor) {
+    reader_.reading.add(fmt::format("kinematics.joint_{}", "abc"[motor]),
+                        std::vector<Value>(joints_[motor].begin(), joints_[motor].end()),
+                        *kinematics_at_);
+  }
 }
 
 void RrfConfigReader::shaper(const SourcePlace& place) {

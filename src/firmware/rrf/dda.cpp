@@ -101,22 +101,26 @@ std::int64_t whole_clocks(float clocks) {
   return clocks > 0.0F ? static_cast<std::int64_t>(std::min(clocks, kMost)) : 0;
 }
 
-// Whether the motor of another axis moves this one too, or the motor of this axis moves another
-// (HasSharedMotor).
-bool shares_motor(const Motors::Rows& rows, std::size_t axis) {
-  for (std::size_t other = 0; other < rows.size(); ++other) {
-    if (other != axis && (rows[axis][other] != 0.0 || rows[other][axis] != 0.0)) return true;
+// Whether the axis and the motor of its number do not belong to each other alone, of axes that
+// unflex knows (Recalc, HasSharedMotor): another motor turns for the axis, or another motor's
+// turning moves the axis.
+bool shares_motor(const Motors::Rows& rows, const Motors::Rows& inverse, std::size_t axis) {
+  bool is_shared = rows[axis][axis] == 0.0 && inverse[axis][axis] == 0.0;
+  for (std::size_t motor = 0; motor < rows.size(); ++motor) {
+    is_shared =
+        is_shared || (motor != axis && (rows[motor][axis] != 0.0 || inverse[axis][motor] != 0.0));
   }
-  return false;
+  return is_shared;
 }
 
 // CoreKinematics::LimitSpeedAndAcceleration. The firmware passes it the direction without signs.
 void limit_by_motors(const Settings& settings, Dda& dda) {
   const Motors::Rows& rows = settings.motors.rows();
+  const Motors::Rows inverse = settings.motors.inverse();
   for (std::size_t motor = 0; motor < rows.size(); ++motor) {
     float part = 0.0F;
     for (const auto axis : gcode::kXYZ) {
-      if (shares_motor(rows, axis)) {
+      if (shares_motor(rows, inverse, axis)) {
         part += static_cast<float>(rows[motor][axis]) * std::abs(dda.direction[axis]);
       }
     }
@@ -133,7 +137,7 @@ void limit_by_motors(const Settings& settings, Dda& dda) {
 Settings make_settings(const Limits& asked, const FirmwareConfig& config) {
   const Limits limits = rrf_raised(asked);
   Settings result;
-  result.motors = config.motors();
+  result.motors = config.motors;
   const auto clock = static_cast<float>(config.step_clock_hz);
   const float per_clock2 = 1.0F / static_cast<float>(config.step_clock_hz * config.step_clock_hz);
   result.clock_hz = clock;

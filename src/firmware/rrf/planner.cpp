@@ -50,7 +50,7 @@ Limits rrf_raised(Limits limits) {
 RrfPlanner::RrfPlanner(const Limits& limits, const FirmwareConfig& config)
     : Planner(limits),
       config_(config),
-      motors_(config.motors()),
+      motors_(config.motors),
       settings_limits_(limits),
       settings_(rrf::make_settings(limits, config)),
       ring_length_(static_cast<std::size_t>(config.ring_length)),

@@ -52,7 +52,8 @@ extern constexpr FirmwareSpec kSpec = {
                  .max_lines_per_s = 500.0,
                  .max_lines_per_s_of_sbc = 250.0,
                  .emit_accel_follows_base = true},
-    .printers = {.lines_from = "RepRapFirmware from its card",
+    .printers = {.takes_a_matrix = true,
+                 .lines_from = "RepRapFirmware from its card",
                  .lines_from_sbc = "RepRapFirmware with its computer"}};
 
 }  // namespace unflex::firmware::rrf

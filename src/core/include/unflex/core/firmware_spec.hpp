@@ -111,6 +111,7 @@ struct FirmwarePrinters {
   bool has_retract_accel = false;  // M204 R
   std::string_view hybrid_corexy_refusal = {};  // why it cannot plan for one; empty: it can
   bool has_all_kinematics = false;
+  bool takes_a_matrix = false;       // from motors to axes, in its configuration
   std::string_view lines_from = {};  // where lines come from, unless a host sends them
   std::string_view lines_from_sbc = {};
 };

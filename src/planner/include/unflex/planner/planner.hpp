@@ -71,7 +71,7 @@ struct InstalledShaper {
 // Values that only the firmware's configuration decides.
 struct FirmwareConfig {
   Firmware firmware = Firmware::klipper;
-  Kinematics kinematics = Kinematics::cartesian;
+  Motors motors;
   // Klipper; for a 0.4 mm nozzle, 1.75 mm filament, max_velocity 300 and max_accel 5000.
   double max_z_velocity_mm_s = 300.0;
   double max_z_accel_mm_s2 = 5000.0;
@@ -96,8 +96,6 @@ struct FirmwareConfig {
   bool has_print_jerk = false;  // from 3.6: Limits::axis_max_jerk_mm_s is a limit of its own
   bool rounds_phases = false;   // from 3.6: each phase of a move lasts whole step clocks, rounded
   double step_clock_hz = 750000.0;
-
-  [[nodiscard]] Motors motors() const { return {kinematics, firmware}; }
 };
 
 // A time of constant acceleration.

@@ -20,9 +20,6 @@ namespace unflex::verify {
 // The motors of X, Y and Z, in the order of `Motors`, and then the extruder's motor.
 inline constexpr std::size_t kStepMotors = Motors::kCount + 1;
 
-// The names of the motors: "X", "Y", "Z", "E", with "A" and "B" where a CoreXY moves X and Y.
-[[nodiscard]] std::array<std::string_view, kStepMotors> step_motor_names(Kinematics kinematics);
-
 // The motors' steps per mm, and how many per second are allowed.
 struct StepRules {
   std::array<double, kStepMotors> steps_per_mm{};  // 0: not known, the motor is not counted
