@@ -115,8 +115,9 @@ class Compensator {
   Compensator(const Job& job, const Engines& engines, const std::vector<verify::BlamedRun>& kept,
               const PassStreams& streams, Progress& progress, report::Report& report)
       : job_(job),
-        rules_{run::compensate_setup(job.settings), run::compensate_setup(as_sliced(job.settings)),
-               run::emit_options(job.settings, UNFLEX_VERSION), rules_of_pass(job, streams.last)},
+        rules_(std::make_shared<run::RunRules>(run::RunRules{
+            run::compensate_setup(job.settings), run::compensate_setup(as_sliced(job.settings)),
+            run::emit_options(job.settings, UNFLEX_VERSION), rules_of_pass(job, streams.last)})),
         processes_(streams.processes),
         output_(&streams.output),
         progress_(job, progress),
@@ -125,14 +126,14 @@ class Compensator {
         admission_(job.settings, rules_, job.input_name, kept, report),
         band_gain_(job_.settings),
         layers_(job.settings.is_timing_free() ? job.settings.timing.min_layer_s : 0.0),
-        queue_(job.workers, rules_.emit.lines.burst_lines > 0),
-        writer_(rules_, job.input_name, job.settings.max_lines_per_s(), report),
+        queue_(job.workers, rules_->emit.lines.burst_lines > 0),
+        writer_(*rules_, job.input_name, job.settings.max_lines_per_s(), report),
         engine_(engines.threaded ? engines.threaded() : nullptr),
         pieces_(
-            streams.input, job.input_name, rules_.verify, streams.slots, [this] { bell_.ring(); },
+            streams.input, job.input_name, rules_->verify, streams.slots, [this] { bell_.ring(); },
             streams.stop_input),
-        recorder_(recorder_for(job, rules_.verify)),
-        verifier_(rules_.verify, observation_of(*recorder_, rules_.verify), job.input_name,
+        recorder_(recorder_for(job, rules_->verify)),
+        verifier_(rules_->verify, observation_of(*recorder_, rules_->verify), job.input_name,
                   job.output_name, streams.slots),
         pool_(std::max(job.workers, 1U), streams.slots) {
     if (engines.threaded && engines.second) {
@@ -216,7 +217,7 @@ class Compensator {
 
   void time_in_thread(const std::shared_ptr<run::RunJob>& job) {
     job->search.bounds = run::move_bounds(job->piece, job_.settings);
-    job->search.extruder = run::extruder_of(job->piece, rules_.emit, job_.settings.timing);
+    job->search.extruder = run::extruder_of(job->piece, rules_->emit, job_.settings.timing);
     band_gain_.choose(*job);
     pool_.submit([this, job] {
       run::choose_timing(*job, {job_.settings.timing.is_optimal(), timer_.get()});
@@ -279,7 +280,7 @@ class Compensator {
                        std::size_t count) {
     pool_.submit([this, job, first, count] {
       if (run::solve_windows(*job, first, count, *engine_)) {
-        run::make_lines(*job, rules_);
+        run::make_lines(*job);
         bell_.ring();
       }
     });
@@ -287,7 +288,7 @@ class Compensator {
 
   void make_lines_in_thread(const std::shared_ptr<run::RunJob>& job) {
     pool_.submit([this, job] {
-      run::make_lines(*job, rules_);
+      run::make_lines(*job);
       bell_.ring();
     });
   }
@@ -335,7 +336,7 @@ class Compensator {
     if (const run::Try* const next = std::get_if<run::Try>(&*written)) {
       tried_ = run::once_more(job, *next);
       pool_.submit([this, run = tried_, remedy = next->remedy] {
-        run::work_out(*run, remedy, rules_);
+        run::work_out(*run, remedy);
         bell_.ring();
       });
       return {};
@@ -399,7 +400,7 @@ class Compensator {
 
   const Job& job_;
   PassOutcome outcome_;
-  run::RunRules rules_;
+  std::shared_ptr<const run::RunRules> rules_;
   ProcessSolver processes_;
   std::ostream* output_;
   PassProgress progress_;

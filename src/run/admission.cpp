@@ -29,16 +29,16 @@ double largest_motor_accel(const std::vector<planner::PlannedMove>& moves, const
 
 }  // namespace
 
-Admission::Admission(const machine::Settings& settings, const RunRules& rules,
+Admission::Admission(const machine::Settings& settings, std::shared_ptr<const RunRules> rules,
                      std::string input_name, const std::vector<verify::BlamedRun>& kept,
                      report::Report& report)
     : settings_(&settings),
-      rules_(&rules),
+      rules_(std::move(rules)),
       input_name_(std::move(input_name)),
       kept_(&kept),
       report_(&report),
-      nozzle_(rules.verify.nozzle, rules.verify.fixed,
-              gcode::Interpreter(rules.emit.interpreter).state().shaper) {}
+      nozzle_(rules_->verify.nozzle, rules_->verify.fixed,
+              gcode::Interpreter(rules_->emit.interpreter).state().shaper) {}
 
 void Admission::admit(RunJob& job) {
   if (!job.piece.is_run) {
@@ -46,6 +46,7 @@ void Admission::admit(RunJob& job) {
     return;
   }
   const Piece& piece = job.piece;
+  job.rules = rules_;
   report_->runs.total += piece.begins_run() ? 1 : 0;
   const double asked_accel_mm_s2 = prepare(job);
   const std::vector<std::string> blamed = blamed_before(piece);
@@ -59,7 +60,7 @@ void Admission::admit(RunJob& job) {
   if (!settings_->is_timing_free()) {
     job.stage = Stage::timed;
   } else if (piece.begins_run() && piece.ends_run()) {
-    job.sliced_setup = setup_for(rules_->sliced_setup, piece, job.nozzle, *settings_).setup;
+    job.sliced_setup = setup_for(job.rules->sliced_setup, piece, job.nozzle, *settings_).setup;
   }
   if (!blamed.empty()) {
     keep_timing(job, blamed.back());
@@ -79,11 +80,11 @@ void Admission::keep_lines(RunJob& job) {
 double Admission::prepare(RunJob& job) {
   const Piece& piece = job.piece;
   job.nozzle = nozzle_at(piece);
-  RunSetup setup = setup_for(rules_->setup, piece, job.nozzle, *settings_);
+  RunSetup setup = setup_for(job.rules->setup, piece, job.nozzle, *settings_);
   warn_if_capped(setup, piece);
   job.setup = std::move(setup.setup);
   job.accel = setup.accel;
-  job.first_stage = first_stage(job, rules_->verify.nozzle);
+  job.first_stage = first_stage(job, job.rules->verify.nozzle);
   job.grid = compensate::node_grid(job.course(), job.setup);
   return setup.asked_accel_mm_s2;
 }
@@ -104,7 +105,7 @@ std::string Admission::refusal(const RunJob& job, double asked_accel_mm_s2) cons
   if (job.piece.cut_off) {
     return "too many lines without motion stand in a row in the middle of the motion";
   }
-  const double accel = largest_motor_accel(job.piece.moves, rules_->verify.fixed.motors);
+  const double accel = largest_motor_accel(job.piece.moves, job.rules->verify.fixed.motors);
   const double most_mm_s2 = settings_->base_max_accel_mm_s2(asked_accel_mm_s2);
   if (accel > kRounding * most_mm_s2) {
     return fmt::format(

@@ -334,8 +334,9 @@ bool solve_windows(RunJob& job, std::size_t first, std::size_t count,
   return note_solved(job, 2 * count);
 }
 
-void make_lines(RunJob& job, const RunRules& rules) noexcept {
+void make_lines(RunJob& job) noexcept {
   try {
+    const RunRules& rules = *job.rules;
     job.failure = failure_of(job);
     if (job.failure.empty()) {
       if (job.has_base()) {

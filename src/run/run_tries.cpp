@@ -14,11 +14,11 @@ constexpr std::array kScaledAgain = {0.9, 0.8, 0.7};
 // Shares of the motors' acceleration for a base that leaves a reserve to whole steps.
 constexpr std::array kReserves = {0.85, 0.7, 0.55};
 
-void solve(RunJob& run, const RunRules& rules) {
+void solve(RunJob& run) {
   lay_out(run);
   const std::unique_ptr<compensate::Engine> engine = compensate::make_banded_engine();
   solve_windows(run, 0, run.windows.spans.size(), *engine);
-  make_lines(run, rules);
+  make_lines(run);
 }
 
 }  // namespace
@@ -47,6 +47,7 @@ std::optional<Try> Tries::next() {
 std::shared_ptr<RunJob> once_more(const RunJob& job, const Try& next) {
   auto run = std::make_shared<RunJob>();
   run->piece = job.piece;
+  run->rules = job.rules;
   run->nozzle = job.nozzle;
   run->first_stage = job.first_stage;
   run->setup = next.remedy == Remedy::as_sliced ? job.sliced_setup.value_or(job.setup) : job.setup;
@@ -67,14 +68,14 @@ std::shared_ptr<RunJob> once_more(const RunJob& job, const Try& next) {
   return run;
 }
 
-void work_out(RunJob& run, Remedy remedy, const RunRules& rules) noexcept try {
+void work_out(RunJob& run, Remedy remedy) noexcept try {
   if (remedy == Remedy::scaled) {
     choose_timing(run, {.is_optimal = false, .engine = compensate::make_rough_engine().get()});
     stretch(run);
   } else if (remedy == Remedy::as_sliced && !run.search.bounds.empty()) {
     keep_feed(run, *compensate::make_rough_engine());
   }
-  solve(run, rules);
+  solve(run);
 } catch (const std::exception& exception) {
   // Out of memory, mostly.
   keep_as_sliced(run, exception.what());

@@ -52,7 +52,7 @@ void follow_motion(const Piece& piece, std::vector<gcode::Segment>& lines) {
 
 RunWriter::RunWriter(const RunRules& rules, std::string input_name, double max_lines_per_s,
                      report::Report& report)
-    : rules_(&rules),
+    : is_robust_(rules.setup.is_robust()),
       input_name_(std::move(input_name)),
       max_lines_per_s_(max_lines_per_s),
       report_(&report),
@@ -127,7 +127,7 @@ std::optional<Try> RunWriter::next_try(const RunJob& job, std::string& objection
     return std::nullopt;
   }
   if (!tries_) {
-    tries_ = Tries(job, objection, rules_->emit.lines.burst_lines > 0);
+    tries_ = Tries(job, objection, job.rules->emit.lines.burst_lines > 0);
   }
   const std::optional<Try> next = tries_->next();
   if (next && next->remedy == Remedy::as_sliced) {
@@ -195,7 +195,7 @@ std::string RunWriter::finish() {
   report_->line_budget.max_lines_per_s = max_lines_per_s_;
   report_->line_budget.cost_rms_mm = emission_.rms_mm();
   report_->line_budget.cost_max_mm = emission_.max_mm;
-  if (rules_->setup.is_robust()) {
+  if (is_robust_) {
     report_->others.robustness = {robust_.rms_mm(), nominal_.rms_mm()};
   }
   return text;
@@ -236,15 +236,15 @@ emit::RunPlan RunWriter::plan(const RunJob& job, double tolerance_share,
   emit::Run run = job.run(tolerance_share, limits_share, line_rate_.last_begins_s());
   run.from_mm = xy_of(emitter_.printer().state().position_mm);
   run.late_s = late_s_;
-  run.kept_before = kept_before(job.piece);
-  return emit::plan_run(run, emitter_.run_start(), rules_->emit);
+  run.kept_before = kept_before(job);
+  return emit::plan_run(run, emitter_.run_start(), job.rules->emit);
 }
 
 // The kept motion before a run, where the firmware would otherwise wait for a first step. Behind a
 // kept line in X and Y the emitter stops the machine.
-std::optional<gcode::Segment> RunWriter::kept_before(const Piece& piece) const {
-  if (!piece.begins_run() || kept_lines_.empty() || kept_lines_.back().moves_xy() ||
-      rules_->emit.lines.first_step_s <= 0.0) {
+std::optional<gcode::Segment> RunWriter::kept_before(const RunJob& job) const {
+  if (!job.piece.begins_run() || kept_lines_.empty() || kept_lines_.back().moves_xy() ||
+      job.rules->emit.lines.first_step_s <= 0.0) {
     return std::nullopt;
   }
   return kept_lines_.back();
@@ -252,14 +252,14 @@ std::optional<gcode::Segment> RunWriter::kept_before(const Piece& piece) const {
 
 // The lines that were prepared, retimed if the part begins late or behind kept motion.
 emit::RunPlan RunWriter::in_time(const RunJob& job) const {
-  const std::optional<gcode::Segment> before = kept_before(job.piece);
+  const std::optional<gcode::Segment> before = kept_before(job);
   if ((std::abs(late_s_) < kLate_s && !before) || job.plan.empty()) {
     return job.plan;
   }
   emit::Run run = job.run();
   run.late_s = late_s_;
   run.kept_before = before;
-  return emit::retimed(job.plan, run, rules_->emit);
+  return emit::retimed(job.plan, run, job.rules->emit);
 }
 
 // Whether the run was planned for the place and state in which the printer is.
@@ -278,10 +278,10 @@ std::optional<std::string> RunWriter::write_run(const RunJob& job, std::string& 
   }
   // The sliced moves would start with the true nozzle. If an earlier run was kept, that nozzle is
   // not the expected one, and the deviation has to be measured again.
-  before_ = verify::apart_mm(run_nozzle_, job.nozzle, rules_->verify.nozzle) > kApart_mm
-                ? deviation_as_sliced(job.piece, run_nozzle_, rules_->verify)
+  before_ = verify::apart_mm(run_nozzle_, job.nozzle, job.rules->verify.nozzle) > kApart_mm
+                ? deviation_as_sliced(job.piece, run_nozzle_, job.rules->verify)
                 : job.before;
-  const bool counts_steps = rules_->emit.lines.burst_lines > 0;
+  const bool counts_steps = job.rules->emit.lines.burst_lines > 0;
   std::optional<std::string> objection = "planned for another start";
   if (fits(job)) {
     objection = try_run(job, in_time(job), false, text);
@@ -329,7 +329,7 @@ std::optional<std::string> RunWriter::try_run(const RunJob& job, const emit::Run
   trial.run(job.run(), plan, text);
   Verdict verdict =
       judge(piece, job.reference(), before_, text, emitter_.printer(), emitter_.printer_limits(),
-            run_nozzle_, rules_->verify, job.lead_in_s(), line_rate_, max_lines_per_s_,
+            run_nozzle_, job.rules->verify, job.lead_in_s(), line_rate_, max_lines_per_s_,
             {piece.begins_run() ? kept_lines_ : last_lines_, !piece.ends_run(), may_be_worse,
              machine_mm_});
   if (verdict.objection) {
@@ -345,7 +345,7 @@ std::optional<std::string> RunWriter::try_run(const RunJob& job, const emit::Run
   sliced_s_ += planner::duration_s(piece.moves);
   written_s_ += planner::duration_s(verdict.replayed) + switching_s_;
   add_emission_error({job.reference(), job.lead_in_s(), job.base, run_nozzle_}, verdict.replayed,
-                     verdict.wait_s, rules_->verify.nozzle, emission_);
+                     verdict.wait_s, job.rules->verify.nozzle, emission_);
   robust_.add(job.robustness.robust);
   nominal_.add(job.robustness.nominal);
   late_s_ += planner::duration_s(verdict.replayed) - planner::duration_s(job.reference()) -

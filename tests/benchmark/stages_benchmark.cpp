@@ -62,10 +62,11 @@ std::unique_ptr<run::RunJob> job_of(const machine::Settings& s, const run::RunRu
   }
   job->nozzle = {{job->piece.moves.front().segment.start_mm[gcode::X], 0.0},
                  {job->piece.moves.front().segment.start_mm[gcode::Y], 0.0}};
+  job->rules = std::make_shared<run::RunRules>(rules);
   job->setup = run::setup_for(rules.setup, job->piece, job->nozzle, s).setup;
   job->grid = compensate::node_grid(job->course(), rules.setup);
-  job->spans = compensate::mesh(job->course(), job->grid, rules.setup);
-  job->results.resize(job->spans.size());
+  job->windows.spans = compensate::mesh(job->course(), job->grid, rules.setup);
+  job->windows.results.resize(job->windows.spans.size());
   return job;
 }
 
@@ -95,7 +96,7 @@ void Solve(benchmark::State& state, compensate::Engine& engine, double accel) {
   if (accel > 0.0) {
     job->setup.x.limits.max_accel_mm_s2 = job->setup.y.limits.max_accel_mm_s2 = accel;
   }
-  std::vector<compensate::RunWindow> windows = run::windows_of(*job, 0, job->spans.size());
+  std::vector<compensate::RunWindow> windows = run::windows_of(*job, 0, job->windows.spans.size());
   double nodes = 0.0;
   for (const compensate::RunWindow& window : windows) {
     nodes += 2.0 * static_cast<double>(window.x.nodes());
@@ -121,8 +122,8 @@ void CutIntoLines(benchmark::State& state, const std::string& firmware) {
   const machine::Settings s = settings(firmware);
   const run::RunRules rules = rules_of(s);
   const auto job = job_of(s, rules);
-  run::solve_windows(*job, 0, job->spans.size(), *compensate::make_banded_engine());
-  run::make_lines(*job, rules);
+  run::solve_windows(*job, 0, job->windows.spans.size(), *compensate::make_banded_engine());
+  run::make_lines(*job);
   for (auto _ : state) {
     benchmark::DoNotOptimize(emit::plan_run(job->run(), job->piece.start, rules.emit));
   }

@@ -35,15 +35,16 @@ class Writer : public ::testing::Test {
  protected:
   explicit Writer(double max_lines_per_s = 1000.0)
       : settings_(flow::testing::settings()),
-        rules_{compensate_setup(settings_), compensate_setup(settings_),
-               emit_options(settings_, "test"), verify_rules(settings_)},
-        writer_(rules_, "in.gcode", max_lines_per_s, report_) {}
+        rules_(std::make_shared<RunRules>(
+            RunRules{compensate_setup(settings_), compensate_setup(settings_),
+                     emit_options(settings_, "test"), verify_rules(settings_)})),
+        writer_(*rules_, "in.gcode", max_lines_per_s, report_) {}
 
   // The pieces of a text, ready to be written.
   std::vector<std::unique_ptr<RunJob>> jobs_of(const std::string& text) {
     std::istringstream stream(text);
-    PieceReader reader(stream, "in.gcode", rules_.emit.interpreter, rules_.emit.printer_limits,
-                       rules_.emit.fixed);
+    PieceReader reader(stream, "in.gcode", rules_->emit.interpreter, rules_->emit.printer_limits,
+                       rules_->emit.fixed);
     std::vector<std::unique_ptr<RunJob>> jobs;
     for (Piece piece; reader.next(piece).value(); piece = {}) {
       jobs.push_back(std::make_unique<RunJob>());
@@ -75,12 +76,12 @@ class Writer : public ::testing::Test {
       }
       tries_.push_back(next->remedy);
       tried = once_more(job, *next);
-      work_out(*tried, next->remedy, rules_);
+      work_out(*tried, next->remedy);
     }
   }
 
   machine::Settings settings_;
-  RunRules rules_;
+  std::shared_ptr<const RunRules> rules_;
   report::Report report_;
   RunWriter writer_;
   std::vector<Remedy> tries_;  // that the writer has asked for
@@ -89,15 +90,16 @@ class Writer : public ::testing::Test {
   void solve(RunJob& job) {
     const std::vector<planner::PlannedMove>& moves = job.piece.moves;
     job.nozzle = job.piece.before.empty()
-                     ? at_rest(moves.front().segment.start_mm, rules_.verify.nozzle)
-                     : at_end_of(job.piece.before.back(), rules_.verify.nozzle);
-    RunSetup setup = setup_for(rules_.setup, job.piece, job.nozzle, settings_);
+                     ? at_rest(moves.front().segment.start_mm, rules_->verify.nozzle)
+                     : at_end_of(job.piece.before.back(), rules_->verify.nozzle);
+    job.rules = rules_;
+    RunSetup setup = setup_for(rules_->setup, job.piece, job.nozzle, settings_);
     job.setup = std::move(setup.setup);
     job.accel = setup.accel;
-    job.first_stage = first_stage(job, rules_.verify.nozzle);
+    job.first_stage = first_stage(job, rules_->verify.nozzle);
     lay_out(job);
     EXPECT_TRUE(solve_windows(job, 0, job.windows.spans.size(), *compensate::make_banded_engine()));
-    make_lines(job, rules_);
+    make_lines(job);
   }
 };
 
@@ -146,7 +148,7 @@ TEST_F(Writer, KeepsARunThatCompensationMakesWorse) {
   for (double& y : job.base.y.position_mm) {
     y += 0.2 * (y > 60.0 && y < 70.0 ? 1.0 : 0.0);
   }
-  job.plan = emit::plan_run(job.run(), job.piece.start, rules_.emit);
+  job.plan = emit::plan_run(job.run(), job.piece.start, rules_->emit);
   static_cast<void>(written(*jobs[0]));
   EXPECT_EQ(written(job), kCorner);
   ASSERT_THAT(report_.runs.fallbacks, SizeIs(1));
@@ -159,7 +161,7 @@ TEST_F(Writer, PlansARunAgainForTheStateItFinds) {
   RunJob& job = *jobs[1];
   static_cast<void>(written(*jobs[0]));
   const std::string as_planned = [&] {
-    RunWriter other(rules_, "in.gcode", 1000.0, report_);
+    RunWriter other(*rules_, "in.gcode", 1000.0, report_);
     static_cast<void>(write(other, *jobs[0]));
     return write(other, job).value_or("");
   }();
@@ -205,7 +207,7 @@ TEST_F(Writer, WritesTheBeginningOfALongRunThoughItIsALittleWorse) {
     const double up = std::sin(std::numbers::pi * static_cast<double>(k) / kNodes);
     first.base.y.position_mm[first.base.nodes() / 2 + k] += kBump_mm * up * up;
   }
-  first.plan = emit::plan_run(first.run(), first.piece.start, rules_.emit);
+  first.plan = emit::plan_run(first.run(), first.piece.start, rules_->emit);
   static_cast<void>(written(*jobs[0]));
   EXPECT_THAT(written(first), StartsWith(";unflex test"));
   ASSERT_THAT(report_.warnings, SizeIs(1));

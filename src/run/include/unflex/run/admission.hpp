@@ -1,6 +1,7 @@
 // Decides the setup with which each run is worked out, or the reason why it is kept.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -14,9 +15,11 @@ namespace unflex::run {
 
 class Admission {
  public:
-  // kept: runs that earlier passes blamed. All must outlive the Admission.
-  Admission(const machine::Settings& settings, const RunRules& rules, std::string input_name,
-            const std::vector<verify::BlamedRun>& kept, report::Report& report);
+  // rules: of every run. kept: runs that earlier passes blamed. Settings, kept and report must
+  // outlive the Admission.
+  Admission(const machine::Settings& settings, std::shared_ptr<const RunRules> rules,
+            std::string input_name, const std::vector<verify::BlamedRun>& kept,
+            report::Report& report);
 
   // The next piece of the file. Afterwards the job is read, timed if its timing stays as sliced, or
   // lined if the piece is kept.
@@ -31,7 +34,7 @@ class Admission {
   [[nodiscard]] std::string refusal(const RunJob& job, double asked_accel_mm_s2) const;
 
   const machine::Settings* settings_;
-  const RunRules* rules_;
+  std::shared_ptr<const RunRules> rules_;
   std::string input_name_;
   const std::vector<verify::BlamedRun>* kept_;
   report::Report* report_;

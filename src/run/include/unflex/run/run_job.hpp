@@ -84,10 +84,19 @@ struct Robustness {
   PathError nominal;  // on the base optimised for them alone
 };
 
+// Rules by which a run is worked on, for the machine as it is while it prints the run.
+struct RunRules {
+  compensate::Setup setup;
+  compensate::Setup sliced_setup;  // for runs that keep their timing where it is free
+  emit::EmitOptions emit;
+  verify::Rules verify;
+};
+
 struct RunJob {
   Piece piece;
   std::atomic<Stage> stage = Stage::read;
   // The members from here on are only used for runs and parts of runs.
+  std::shared_ptr<const RunRules> rules;
   std::string failure;             // why the run is kept
   dynamics::NozzleXY nozzle;       // at its begin, if every run before is compensated
   dynamics::NozzleXY first_stage;  // `nozzle` as a state of the setup's axes
@@ -138,14 +147,6 @@ struct RunJob {
                               std::vector<double> lines_before_s = {}) const;
 };
 
-// Rules by which runs are worked on.
-struct RunRules {
-  compensate::Setup setup;
-  compensate::Setup sliced_setup;  // for runs that keep their timing where it is free
-  emit::EmitOptions emit;
-  verify::Rules verify;
-};
-
 [[nodiscard]] AxisResult axis_result(Result<compensate::AxisSolution> solution);
 
 // There is nothing to work out: the piece is written as it is, for this reason if it is a run.
@@ -191,6 +192,6 @@ bool solve_windows(RunJob& job, std::size_t first, std::size_t count,
                    const compensate::Engine& engine) noexcept;
 
 // Joins the windows of a solved run and cuts its base into lines. Throws nothing.
-void make_lines(RunJob& job, const RunRules& rules) noexcept;
+void make_lines(RunJob& job) noexcept;
 
 }  // namespace unflex::run

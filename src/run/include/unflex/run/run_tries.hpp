@@ -46,6 +46,6 @@ class Tries {
 [[nodiscard]] std::shared_ptr<RunJob> once_more(const RunJob& job, const Try& next);
 
 // Works out the run of a try as far as its lines. Throws nothing.
-void work_out(RunJob& run, Remedy remedy, const RunRules& rules) noexcept;
+void work_out(RunJob& run, Remedy remedy) noexcept;
 
 }  // namespace unflex::run

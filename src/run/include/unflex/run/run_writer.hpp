@@ -21,8 +21,8 @@ namespace unflex::run {
 
 class RunWriter {
  public:
-  // Rules and report must outlive the writer. input_name: for messages. max_lines_per_s: the
-  // budget.
+  // rules: of the file; each run has its own. The report must outlive the writer. input_name: for
+  // messages. max_lines_per_s: the budget.
   RunWriter(const RunRules& rules, std::string input_name, double max_lines_per_s,
             report::Report& report);
 
@@ -49,7 +49,7 @@ class RunWriter {
   [[nodiscard]] emit::RunPlan plan(const RunJob& job, double tolerance_share,
                                    double limits_share) const;
   [[nodiscard]] emit::RunPlan in_time(const RunJob& job) const;
-  [[nodiscard]] std::optional<gcode::Segment> kept_before(const Piece& piece) const;
+  [[nodiscard]] std::optional<gcode::Segment> kept_before(const RunJob& job) const;
   [[nodiscard]] bool fits(const RunJob& job) const;
   void begin(const Piece& piece);
   std::string keep_lines(const Piece& piece);
@@ -69,7 +69,7 @@ class RunWriter {
                            std::vector<report::Fallback>& list);
   void note_fallback(const RunJob& job, std::string reason);
 
-  const RunRules* rules_;
+  bool is_robust_;  // the base is to suit more models than one
   std::string input_name_;
   double max_lines_per_s_;
   report::Report* report_;
