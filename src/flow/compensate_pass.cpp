@@ -23,6 +23,7 @@
 #include "unflex/run/emit_options.hpp"
 #include "unflex/run/judge.hpp"
 #include "unflex/run/layer_times.hpp"
+#include "unflex/run/machine_model.hpp"
 #include "unflex/run/move_bounds.hpp"
 #include "unflex/run/nominal_sample.hpp"
 #include "unflex/run/run_writer.hpp"
@@ -57,8 +58,8 @@ machine::Settings as_sliced(machine::Settings settings) {
 
 // A stream cannot be written again with a run kept, and no pass follows the last one. In both cases
 // a run may be worse by more before it counts as a violation.
-verify::Rules rules_of_pass(const Job& job, bool last) {
-  verify::Rules rules = run::verify_rules(job.settings);
+verify::Rules rules_of_pass(const Job& job, const machine::Settings& settings, bool last) {
+  verify::Rules rules = run::verify_rules(settings);
   if (job.output_stream || last) {
     rules.leeway = {.times = run::kLeewayTimes,
                     .rms_mm = run::kLeewayRms_mm,
@@ -115,26 +116,30 @@ class Compensator {
   Compensator(const Job& job, const Engines& engines, const std::vector<verify::BlamedRun>& kept,
               const PassStreams& streams, Progress& progress, report::Report& report)
       : job_(job),
-        rules_(std::make_shared<run::RunRules>(run::RunRules{
-            run::compensate_setup(job.settings), run::compensate_setup(as_sliced(job.settings)),
-            run::emit_options(job.settings, UNFLEX_VERSION), rules_of_pass(job, streams.last)})),
+        machine_(job.settings,
+                 [this, last = streams.last](const machine::Settings& settings) {
+                   return run::RunRules{settings, run::compensate_setup(settings),
+                                        run::compensate_setup(as_sliced(settings)),
+                                        run::emit_options(settings, UNFLEX_VERSION),
+                                        rules_of_pass(job_, settings, last)};
+                 }),
         processes_(streams.processes),
         output_(&streams.output),
         progress_(job, progress),
         slots_(&streams.slots),
         report_(&report),
-        admission_(job.settings, rules_, job.input_name, kept, report),
+        admission_(machine_, job.input_name, kept, report),
         band_gain_(job_.settings),
         layers_(job.settings.is_timing_free() ? job.settings.timing.min_layer_s : 0.0),
-        queue_(job.workers, rules_->emit.lines.burst_lines > 0),
-        writer_(*rules_, job.input_name, job.settings.max_lines_per_s(), report),
+        queue_(job.workers, machine_.empty().emit.lines.burst_lines > 0),
+        writer_(machine_.empty(), job.input_name, job.settings.max_lines_per_s(), report),
         engine_(engines.threaded ? engines.threaded() : nullptr),
         pieces_(
-            streams.input, job.input_name, rules_->verify, streams.slots, [this] { bell_.ring(); },
-            streams.stop_input),
-        recorder_(recorder_for(job, rules_->verify)),
-        verifier_(rules_->verify, observation_of(*recorder_, rules_->verify), job.input_name,
-                  job.output_name, streams.slots),
+            streams.input, job.input_name, machine_.empty().verify, streams.slots,
+            [this] { bell_.ring(); }, streams.stop_input),
+        recorder_(recorder_for(job, machine_.empty().verify)),
+        verifier_(machine_.empty().verify, observation_of(*recorder_, machine_.empty().verify),
+                  job.input_name, job.output_name, streams.slots),
         pool_(std::max(job.workers, 1U), streams.slots) {
     if (engines.threaded && engines.second) {
       gaps_.emplace();
@@ -217,7 +222,7 @@ class Compensator {
 
   void time_in_thread(const std::shared_ptr<run::RunJob>& job) {
     job->search.bounds = run::move_bounds(job->piece, job_.settings);
-    job->search.extruder = run::extruder_of(job->piece, rules_->emit, job_.settings.timing);
+    job->search.extruder = run::extruder_of(job->piece, job->rules->emit, job_.settings.timing);
     band_gain_.choose(*job);
     pool_.submit([this, job] {
       run::choose_timing(*job, {job_.settings.timing.is_optimal(), timer_.get()});
@@ -400,7 +405,7 @@ class Compensator {
 
   const Job& job_;
   PassOutcome outcome_;
-  std::shared_ptr<const run::RunRules> rules_;
+  run::MachineModel machine_;
   ProcessSolver processes_;
   std::ostream* output_;
   PassProgress progress_;

@@ -52,6 +52,25 @@ dynamics::FlexibleAxis behind(const dynamics::FlexibleAxis& axis, double freq_hz
   return freq_hz > 0.0 ? axis.followed_by(2.0 * std::numbers::pi * freq_hz, damping_ratio) : axis;
 }
 
+Settings with_print(Settings settings, double printed_g) {
+  for_each_axis(
+      [&](AxisDynamics& axis, double& second_hz) {
+        const double share = axis.frequency_share(printed_g);
+        axis.freq_hz *= share;
+        second_hz *= share;
+        for (ModeSettings& mode : axis.modes) {
+          mode.freq_hz *= share;
+        }
+        for (PlantSettings& plant : axis.plants) {
+          for (ModeSettings& mode : plant.modes) {
+            mode.freq_hz *= share;
+          }
+        }
+      },
+      settings.dynamics, settings.second.freq_hz);
+  return settings;
+}
+
 Axes<dynamics::FlexibleAxis> nozzle_axes(const Settings& settings) {
   return map_axes(
       [](const AxisDynamics& axis, double second_hz, double second_damping_ratio) {

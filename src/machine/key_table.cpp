@@ -102,6 +102,9 @@ constexpr std::array kOtherKeys = {
         "Section of the filament that is material, where it is not a full cylinder; E is fitted to "
         "it",
         "a full section of filament_diameter_mm", &derived<&S::filament_area_mm2>},
+    Key{"extruder.filament_density_g_cm3", &setting<&S::extruder, &E::filament_density_g_cm3>,
+        Bounds{.min = 0.1, .max = 20.0}, "g/cm³",
+        "Density of the filament, for the mass of the print on a bed that moves"},
     Key{"extruder.filament_profile", &setting<&S::extruder, &E::filament_profile>, kAny, "",
         "Table of that section along the spool: columns mm and area_mm2 or diameter_mm"},
     Key{"extruder.filament_start_mm", &setting<&S::extruder, &E::filament_start_mm>, kAny, "mm",
@@ -199,6 +202,10 @@ constexpr std::array kOtherKeys = {
         Bounds{.min = 1.0, .max = 1000.0}, "Hz", "Natural frequency of the nozzle along X"},
     Key{"dynamics.x.damping_ratio", &axis_setting<&S::dynamics, 0, &D::damping_ratio>,
         Bounds{.min = 0.0, .max = 1.0}, "", "Damping ratio ζ along X"},
+    Key{"dynamics.x.moving_mass_g", &axis_setting<&S::dynamics, 0, &D::moving_mass_g>, kNotNegative,
+        "g",
+        "Mass of a bed that moves along X, without a print: frequencies are those of the empty bed "
+        "and fall while the print grows; 0: the bed does not move along X"},
     Key{"dynamics.x.mode", &axis_setting<&S::dynamics, 0, &D::modes>, kAny, "",
         "Modes along X, in place of freq_hz and damping_ratio: [[dynamics.x.mode]] with freq_hz, "
         "damping_ratio and gain; the gains add up to 1",
@@ -238,6 +245,10 @@ constexpr std::array kOtherKeys = {
         Bounds{.min = 1.0, .max = 1000.0}, "Hz", "Natural frequency of the nozzle along Y"},
     Key{"dynamics.y.damping_ratio", &axis_setting<&S::dynamics, 1, &D::damping_ratio>,
         Bounds{.min = 0.0, .max = 1.0}, "", "Damping ratio ζ along Y"},
+    Key{"dynamics.y.moving_mass_g", &axis_setting<&S::dynamics, 1, &D::moving_mass_g>, kNotNegative,
+        "g",
+        "Mass of a bed that moves along Y, without a print: frequencies are those of the empty bed "
+        "and fall while the print grows; 0: the bed does not move along Y"},
     Key{"dynamics.y.mode", &axis_setting<&S::dynamics, 1, &D::modes>, kAny, "",
         "Modes along Y, in place of freq_hz and damping_ratio: [[dynamics.y.mode]] with freq_hz, "
         "damping_ratio and gain; the gains add up to 1",

@@ -154,6 +154,15 @@ double Settings::least_speed_step_mm_s() const {
   return kLeastHeadroom * limits.max_accel_mm_s2 * min_line_s() / kSpeedStepShare;
 }
 
+double Settings::filament_g_per_mm() const {
+  constexpr double kCm3PerMm3 = 1e-3;
+  return kCm3PerMm3 * extruder.filament_density_g_cm3 * filament_area_mm2();
+}
+
+bool Settings::carries_print() const {
+  return any_axis([](const AxisDynamics& axis) { return axis.moving_mass_g > 0.0; }, dynamics);
+}
+
 double Settings::filament_area_mm2() const {
   return extruder.filament_area_mm2.value_or(
       std::numbers::pi / 4.0 * extruder.filament_diameter_mm * extruder.filament_diameter_mm);
@@ -258,6 +267,12 @@ double Settings::base_max_accel_mm_s2(double asked_mm_s2) const {
                   std::min(base_accel_times_asked() * asked_mm_s2, most));
 }
 
+// f = f₀ √(m₀ / (m₀ + m)): the belt stays as stiff while the mass on it grows.
+double AxisDynamics::frequency_share(double printed_g) const {
+  return moving_mass_g > 0.0 ? std::sqrt(moving_mass_g / (moving_mass_g + std::max(printed_g, 0.0)))
+                             : 1.0;
+}
+
 double AxisDynamics::slowest_hz() const {
   return modes.empty() ? freq_hz : std::ranges::min(modes, {}, &ModeSettings::freq_hz).freq_hz;
 }
@@ -281,13 +296,16 @@ double AxisDynamics::good_period_ms() const {
 }
 
 std::string AxisDynamics::description() const {
-  if (modes.empty()) {
-    return fmt::format("{:.4g} Hz, ζ {:.3g}", freq_hz, damping_ratio);
-  }
   std::string text;
+  if (modes.empty()) {
+    text = fmt::format("{:.4g} Hz, ζ {:.3g}", freq_hz, damping_ratio);
+  }
   for (const ModeSettings& mode : modes) {
     text += fmt::format("{}{:.4g} Hz, ζ {:.3g}, gain {:.3g}", text.empty() ? "" : " + ",
                         mode.freq_hz, mode.damping_ratio, mode.gain);
+  }
+  if (moving_mass_g > 0.0) {
+    text += fmt::format(", on a bed of {:.4g} g that gets heavier", moving_mass_g);
   }
   return text;
 }

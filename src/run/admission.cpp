@@ -29,11 +29,10 @@ double largest_motor_accel(const std::vector<planner::PlannedMove>& moves, const
 
 }  // namespace
 
-Admission::Admission(const machine::Settings& settings, std::shared_ptr<const RunRules> rules,
-                     std::string input_name, const std::vector<verify::BlamedRun>& kept,
-                     report::Report& report)
-    : settings_(&settings),
-      rules_(std::move(rules)),
+Admission::Admission(MachineModel& machine, std::string input_name,
+                     const std::vector<verify::BlamedRun>& kept, report::Report& report)
+    : machine_(&machine),
+      rules_(machine.at(0.0)),
       input_name_(std::move(input_name)),
       kept_(&kept),
       report_(&report),
@@ -46,21 +45,27 @@ void Admission::admit(RunJob& job) {
     return;
   }
   const Piece& piece = job.piece;
+  if (piece.begins_run()) {
+    // Parts of a run meet in motion, so a run has one machine.
+    rules_ = machine_->at(piece.moves.front().segment.start_mm[gcode::E]);
+    nozzle_.set_model(rules_->verify.nozzle);
+  }
   job.rules = rules_;
   report_->runs.total += piece.begins_run() ? 1 : 0;
   const double asked_accel_mm_s2 = prepare(job);
   const std::vector<std::string> blamed = blamed_before(piece);
   // A run of free timing gets another chance in the timing as sliced.
-  const std::size_t chances = settings_->is_timing_free() ? 2 : 1;
+  const std::size_t chances = rules_->settings.is_timing_free() ? 2 : 1;
   std::string reason = blamed.size() >= chances ? blamed.back() : refusal(job, asked_accel_mm_s2);
   if (!reason.empty()) {
     keep_as_sliced(job, std::move(reason));
     return;
   }
-  if (!settings_->is_timing_free()) {
+  if (!rules_->settings.is_timing_free()) {
     job.stage = Stage::timed;
   } else if (piece.begins_run() && piece.ends_run()) {
-    job.sliced_setup = setup_for(job.rules->sliced_setup, piece, job.nozzle, *settings_).setup;
+    job.sliced_setup =
+        setup_for(job.rules->sliced_setup, piece, job.nozzle, job.rules->settings).setup;
   }
   if (!blamed.empty()) {
     keep_timing(job, blamed.back());
@@ -80,7 +85,7 @@ void Admission::keep_lines(RunJob& job) {
 double Admission::prepare(RunJob& job) {
   const Piece& piece = job.piece;
   job.nozzle = nozzle_at(piece);
-  RunSetup setup = setup_for(job.rules->setup, piece, job.nozzle, *settings_);
+  RunSetup setup = setup_for(job.rules->setup, piece, job.nozzle, job.rules->settings);
   warn_if_capped(setup, piece);
   job.setup = std::move(setup.setup);
   job.accel = setup.accel;
@@ -106,7 +111,7 @@ std::string Admission::refusal(const RunJob& job, double asked_accel_mm_s2) cons
     return "too many lines without motion stand in a row in the middle of the motion";
   }
   const double accel = largest_motor_accel(job.piece.moves, job.rules->verify.fixed.motors);
-  const double most_mm_s2 = settings_->base_max_accel_mm_s2(asked_accel_mm_s2);
+  const double most_mm_s2 = rules_->settings.base_max_accel_mm_s2(asked_accel_mm_s2);
   if (accel > kRounding * most_mm_s2) {
     return fmt::format(
         "the plan itself accelerates a motor by {:.0f} mm/s², more than base.max_accel_mm_s2, "
@@ -124,8 +129,9 @@ std::string Admission::refusal(const RunJob& job, double asked_accel_mm_s2) cons
 void Admission::warn_if_capped(const RunSetup& setup, const Piece& piece) {
   // Below this many times the plan's acceleration the error grows.
   constexpr double kEnough = 2.0;
-  const double wanted_mm_s2 = std::min(kEnough * setup.asked_accel_mm_s2,
-                                       settings_->base_max_accel_mm_s2(setup.asked_accel_mm_s2));
+  const double wanted_mm_s2 =
+      std::min(kEnough * setup.asked_accel_mm_s2,
+               rules_->settings.base_max_accel_mm_s2(setup.asked_accel_mm_s2));
   if (told_of_cap_ || wanted_mm_s2 <= setup.accel_by_lines_mm_s2) {
     return;
   }

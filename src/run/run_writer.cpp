@@ -65,7 +65,7 @@ Result<RunWriter::Written> RunWriter::write(const RunJob& job, const RunJob* tri
     return keep_lines(job.piece);
   }
   if (tried == nullptr) {
-    begin(job.piece);
+    begin(job);
   }
   std::string text;
   std::optional<std::string> objection = write_present(job, tried, text);
@@ -92,7 +92,8 @@ std::string RunWriter::keep_lines(const Piece& piece) {
 }
 
 // The run, or part of a run, is at hand from now on.
-void RunWriter::begin(const Piece& piece) {
+void RunWriter::begin(const RunJob& job) {
+  const Piece& piece = job.piece;
   if (piece.begins_run()) {
     last_lines_.clear();
     late_s_ = 0.0;
@@ -100,6 +101,7 @@ void RunWriter::begin(const Piece& piece) {
     run_line_ = piece.moves.front().segment.line;
   }
   tries_.reset();
+  nozzle_.set_model(job.rules->verify.nozzle);
   NozzleFollower at_run = nozzle_;
   switching_s_ = at_run.begin_run(piece);
   run_nozzle_ = at_run.nozzle();

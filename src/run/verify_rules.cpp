@@ -50,6 +50,10 @@ verify::Rules verify_rules(const machine::Settings& settings) {
   rules.nozzle = {machine::nozzle_axes(settings), settings.verify.step_ms * 1e-3,
                   settings.verify.hold_s};
   rules.plants = nozzles_of_plants(settings, rules.nozzle);
+  rules.print_on_bed = {
+      map_axes([](const machine::AxisDynamics& axis) { return axis.moving_mass_g; },
+               settings.dynamics),
+      settings.filament_g_per_mm()};
   for_each_axis(
       [](const std::optional<machine::Range>& travel, verify::TravelRange& range) {
         range.min_assumed = !travel;

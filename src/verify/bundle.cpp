@@ -20,7 +20,7 @@ const BundleKernel& bundle_kernel() {
 }
 
 Bundle::Bundle(std::vector<NozzleModel> models)
-    : models_(std::move(models)), kernel_(&bundle_kernel()) {
+    : given_(std::move(models)), models_(given_), kernel_(&bundle_kernel()) {
   arrays_.places = (models_.size() + kLanes - 1) / kLanes * kLanes;
   for (const NozzleModel& model : models_) {
     for_each_axis(
@@ -47,6 +47,10 @@ Bundle::Bundle(std::vector<NozzleModel> models)
   }
   arrays_.away.fill(std::vector<double>(arrays_.places));
   arrays_.was.fill(std::vector<double>(arrays_.places));
+  take_models();
+}
+
+void Bundle::take_models() {
   for (std::size_t number = 0; number < models_.size(); ++number) {
     for (const std::size_t axis : {0U, 1U}) {
       const dynamics::FlexibleAxis& of = models_[number][axis];
@@ -62,9 +66,27 @@ Bundle::Bundle(std::vector<NozzleModel> models)
   }
 }
 
+void Bundle::set_frequencies(const Axes<double>& shares) {
+  models_ = given_;
+  fastest_rad_s_ = 0.0;
+  for (NozzleModel& model : models_) {
+    for_each_axis(
+        [&](dynamics::FlexibleAxis& axis, double share) {
+          axis = axis.detuned(share);
+          fastest_rad_s_ = std::max(fastest_rad_s_, axis.fastest_rad_s());
+        },
+        model, shares);
+  }
+  take_models();
+  has_maps_ = false;
+}
+
 void Bundle::keep_first() {
   const NozzleXY first = nozzle();
-  *this = Bundle({models_.front()});
+  const NozzleModel present = models_.front();
+  *this = Bundle({given_.front()});
+  models_.front() = present;
+  take_models();
   set_nozzle(0, first);
 }
 

@@ -28,6 +28,9 @@ class Bundle {
   explicit Bundle(std::vector<NozzleModel> models);
 
   [[nodiscard]] std::size_t count() const { return models_.size(); }
+  // From now on all frequencies of an axis are this many times those of the models given. The
+  // nozzles' states stay.
+  void set_frequencies(const Axes<double>& shares);
   // Forgets all nozzles but the first, and their models.
   void keep_first();
   [[nodiscard]] const NozzleModel& model(std::size_t number = 0) const { return models_[number]; }
@@ -78,13 +81,15 @@ class Bundle {
   }
 
  private:
+  void take_models();
   // change(axis, value, nozzle) for each axis of each nozzle.
   template <class Change, class Value>
   void change_all(const Change& change, const Axes<Value>& by);
   void add(const std::vector<double>& largest_mm2, double h, BundleSums& sums) const;
   [[nodiscard]] DeviationStats stats(const BundleSums& sums, std::size_t number) const;
 
-  std::vector<NozzleModel> models_;
+  std::vector<NozzleModel> given_;
+  std::vector<NozzleModel> models_;  // with set_frequencies()
   const BundleKernel* kernel_;
   double fastest_rad_s_ = 0.0;
   BundleArrays arrays_;

@@ -31,6 +31,8 @@ class Nozzles {
     return main_.deviation_of_other(number);
   }
 
+  void set_frequencies(const Axes<double>& shares) { main_.set_frequencies(shares); }
+
   // The clock of the moves that have been played; the nozzles are no further than that.
   [[nodiscard]] double plan_time_s() const;
   // Where the moves that have been played end.

@@ -165,6 +165,17 @@ void Verifier::begin_paths(bool compensated) {
   }
 }
 
+// The bed is as heavy in a whole section as where it begins.
+void Verifier::load_bed() {
+  if (!rules_.print_on_bed.acts()) {
+    return;
+  }
+  const Axes<double> shares = rules_.print_on_bed.frequency_shares(paths_.sliced().filament_mm());
+  for_sliced([&](Nozzles& nozzles) { nozzles.set_frequencies(shares); });
+  emitted_.set_frequencies(shares);
+  kept_.set_frequencies(shares);
+}
+
 void Verifier::begin_section(bool compensated) {
   rate_.forget();
   base_.begin_run();
@@ -174,6 +185,7 @@ void Verifier::begin_section(bool compensated) {
   begin_paths(compensated);
   follow_pressure(compensated);
   shape_sliced();
+  load_bed();
   for_sliced([&](Nozzles& nozzles) { nozzles.begin_section(paths_.sliced()); });
   if (compensated) {
     // A run begins at rest, and it has a clock of its own.

@@ -61,6 +61,7 @@ class Verifier {
   bool next_resting_move(planner::PlannedMove& move);
   bool next_output_move(OutputMove& move);
   bool ends_here(const planner::PlannedMove& move, const Track& file);
+  void load_bed();
   void begin_section(bool compensated);
   void begin_paths(bool compensated);
   void play_run();

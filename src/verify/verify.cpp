@@ -1,5 +1,8 @@
 #include "unflex/verify/verify.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 #include "verifier.hpp"
 
 namespace unflex::verify {
@@ -14,6 +17,13 @@ PlayedFile played(Meter& meter, const Track& track) {
 }
 
 }  // namespace
+
+Axes<double> PrintOnBed::frequency_shares(double laid_mm) const {
+  const double printed_g = std::max(laid_mm, 0.0) * filament_g_per_mm;
+  return map_axes(
+      [&](double mass_g) { return mass_g > 0.0 ? std::sqrt(mass_g / (mass_g + printed_g)) : 1.0; },
+      moving_mass_g);
+}
 
 VerifyReport Verifier::report() {
   VerifyReport report = totals_;

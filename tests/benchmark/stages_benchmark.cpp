@@ -36,7 +36,7 @@ machine::Settings settings(const std::string& firmware) {
 }
 
 run::RunRules rules_of(const machine::Settings& s) {
-  return {run::compensate_setup(s), run::compensate_setup(s), run::emit_options(s, "benchmark"),
+  return {s, run::compensate_setup(s), run::compensate_setup(s), run::emit_options(s, "benchmark"),
           run::verify_rules(s)};
 }
 

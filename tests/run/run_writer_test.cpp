@@ -36,7 +36,7 @@ class Writer : public ::testing::Test {
   explicit Writer(double max_lines_per_s = 1000.0)
       : settings_(flow::testing::settings()),
         rules_(std::make_shared<RunRules>(
-            RunRules{compensate_setup(settings_), compensate_setup(settings_),
+            RunRules{settings_, compensate_setup(settings_), compensate_setup(settings_),
                      emit_options(settings_, "test"), verify_rules(settings_)})),
         writer_(*rules_, "in.gcode", max_lines_per_s, report_) {}
 

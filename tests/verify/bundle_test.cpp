@@ -87,6 +87,42 @@ TEST(Bundle, StepsAsRungeAndKuttaDo) {
   }
 }
 
+// The states stay, and from then on the nozzles move as those of the slower models.
+TEST(Bundle, GoesOnWithOtherFrequencies) {
+  std::mt19937_64 random(12);
+  const Axes<double> shares{0.9, 0.8};
+  const std::vector<NozzleModel> models = models_of(3, 2);
+  std::vector<NozzleModel> slower = models;
+  for (NozzleModel& model : slower) {
+    model.x = model.x.detuned(shares.x);
+    model.y = model.y.detuned(shares.y);
+  }
+  for (const bool keeps_first : {false, true}) {
+    Bundle bundle(models);
+    Bundle expected(slower);
+    for (std::size_t i = 0; i < models.size(); ++i) {
+      const NozzleXY nozzle = somewhere(models[i], random);
+      bundle.set_nozzle(i, nozzle);
+      expected.set_nozzle(i, nozzle);
+    }
+    bundle.set_frequencies(on_all_axes(0.5));
+    bundle.set_frequencies(shares);
+    if (keeps_first) {
+      bundle.keep_first();
+      expected.keep_first();
+    }
+    for (const double steps : {1.0, 20.0}) {
+      bundle.begin_steps(steps, 5e-4);
+      expected.begin_steps(steps, 5e-4);
+      const dynamics::BaseXY base{{100.0, 20.0, 3000.0}, {50.0, -30.0, -4000.0}};
+      bundle.step(base);
+      expected.step(base);
+    }
+    EXPECT_EQ(bundle.states(), expected.states());
+    EXPECT_EQ(bundle.step_s(), expected.step_s());
+  }
+}
+
 TEST(Bundle, MovesNozzlesAsOneByOne) {
   constexpr double kStep_s = 5e-4;
   std::mt19937_64 random(1);

@@ -588,5 +588,16 @@ TEST(PressureAdvance, IsToBeAsSlicedWhereFilamentIsLaid) {
             "out.gcode:8: the printer's pressure advance is not restored\n");
 }
 
+// 250 g on a bed of 500 g: 38 Hz become 31.03.
+TEST(PrintOnABed, MakesItSwingSlowerByTheRootOfItsMass) {
+  const PrintOnBed bed{{0.0, 500.0}, 3e-3};
+  EXPECT_TRUE(bed.acts());
+  EXPECT_DOUBLE_EQ(bed.frequency_shares(0.0).y, 1.0);
+  EXPECT_NEAR(38.0 * bed.frequency_shares(250.0 / 3e-3).y, 31.0269, 1e-4);
+  EXPECT_EQ(bed.frequency_shares(250.0 / 3e-3).x, 1.0);
+  EXPECT_EQ(bed.frequency_shares(-5.0).y, 1.0) << "filament drawn back";
+  EXPECT_FALSE(PrintOnBed{}.acts());
+}
+
 }  // namespace
 }  // namespace unflex::verify

@@ -143,6 +143,7 @@ struct ExtruderSettings {
   double filament_diameter_mm = 1.75;       // that the print is sliced for
   std::optional<double> filament_area_mm2;  // section that is material; unset: of that diameter
   std::string filament_profile;             // table of it along the spool; empty: none
+  double filament_density_g_cm3 = 1.24;     // PLA's
   double filament_start_mm = 0.0;           // where on the spool the print begins
   std::optional<double> max_extrude_cross_section_mm2;   // unset: 4 · nozzle², as in Klipper
   std::optional<double> max_extrude_only_velocity_mm_s;  // unset: Klipper's formula
@@ -220,7 +221,12 @@ struct AxisDynamics {
   double damping_ratio = 0.06;
   std::vector<ModeSettings> modes = {};
   std::vector<PlantSettings> plants = {};  // besides the axis as given, which has the rest
+  // Mass that moves along the axis and carries the print, without it: a bed. The frequencies are
+  // those of the empty bed. 0: the axis does not carry the print.
+  double moving_mass_g = 0.0;
 
+  // The share of its empty frequency that the axis has with this mass of print on it.
+  [[nodiscard]] double frequency_share(double printed_g) const;
   [[nodiscard]] double slowest_hz() const;
   [[nodiscard]] double fastest_hz() const;
   // The node period at which a window follows all modes: a twentieth of the period of one with a
@@ -399,6 +405,9 @@ struct Settings {
   // The emit.max_speed_step_mm_s below which the base could not accelerate enough.
   [[nodiscard]] double least_speed_step_mm_s() const;
   [[nodiscard]] double filament_area_mm2() const;
+  [[nodiscard]] double filament_g_per_mm() const;
+  // Whether some axis' frequencies fall while the print grows.
+  [[nodiscard]] bool carries_print() const;
   [[nodiscard]] double max_extrude_cross_section_mm2() const;
   [[nodiscard]] double max_extrude_only_velocity_mm_s() const;
   [[nodiscard]] double max_extrude_only_accel_mm_s2() const;

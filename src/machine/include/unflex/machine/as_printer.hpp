@@ -23,6 +23,9 @@ inline constexpr double kGrid_mm = 1e-4;
 // The grid on which lines end, mm: that one, or steps.
 [[nodiscard]] double grid_mm(const Settings& settings);
 
+// The settings with the axes' frequencies as they are while this mass of print lies on the bed.
+[[nodiscard]] Settings with_print(Settings settings, double printed_g);
+
 [[nodiscard]] dynamics::FlexibleAxis flexible_axis(const std::vector<ModeSettings>& settings);
 [[nodiscard]] dynamics::FlexibleAxis flexible_axis(const AxisDynamics& dynamics);
 // The axis with a second mode behind it; without one if its frequency is 0.

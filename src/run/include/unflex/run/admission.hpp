@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "unflex/machine/machine.hpp"
 #include "unflex/report/report.hpp"
+#include "unflex/run/machine_model.hpp"
 #include "unflex/run/nozzle_motion.hpp"
 #include "unflex/run/run_job.hpp"
 #include "unflex/run/setup.hpp"
@@ -17,9 +17,8 @@ class Admission {
  public:
   // rules: of every run. kept: runs that earlier passes blamed. Settings, kept and report must
   // outlive the Admission.
-  Admission(const machine::Settings& settings, std::shared_ptr<const RunRules> rules,
-            std::string input_name, const std::vector<verify::BlamedRun>& kept,
-            report::Report& report);
+  Admission(MachineModel& machine, std::string input_name,
+            const std::vector<verify::BlamedRun>& kept, report::Report& report);
 
   // The next piece of the file. Afterwards the job is read, timed if its timing stays as sliced, or
   // lined if the piece is kept.
@@ -33,8 +32,8 @@ class Admission {
   [[nodiscard]] std::vector<std::string> blamed_before(const Piece& piece) const;
   [[nodiscard]] std::string refusal(const RunJob& job, double asked_accel_mm_s2) const;
 
-  const machine::Settings* settings_;
-  std::shared_ptr<const RunRules> rules_;
+  MachineModel* machine_;
+  std::shared_ptr<const RunRules> rules_;  // of the run at hand
   std::string input_name_;
   const std::vector<verify::BlamedRun>* kept_;
   report::Report* report_;

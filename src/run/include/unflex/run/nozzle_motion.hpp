@@ -78,6 +78,8 @@ class NozzleFollower {
   // The emitter switches the shaper off for a run that begins. Returns how long the machine stands
   // still for it, s.
   double begin_run(const Piece& run);
+  // The nozzle goes on with this model.
+  void set_model(const verify::NozzleModel& model) { model_ = model; }
   // Sets the nozzle and the place of the base, where they are known.
   void set(const dynamics::NozzleXY& nozzle, const gcode::Position& base);
 

@@ -17,6 +17,7 @@
 #include "unflex/dynamics/base_trajectory.hpp"
 #include "unflex/emit/emit_options.hpp"
 #include "unflex/emit/run.hpp"
+#include "unflex/machine/machine.hpp"
 #include "unflex/run/path_error.hpp"
 #include "unflex/run/piece_reader.hpp"
 #include "unflex/timing/timing.hpp"
@@ -86,6 +87,7 @@ struct Robustness {
 
 // Rules by which a run is worked on, for the machine as it is while it prints the run.
 struct RunRules {
+  machine::Settings settings;
   compensate::Setup setup;
   compensate::Setup sliced_setup;  // for runs that keep their timing where it is free
   emit::EmitOptions emit;

@@ -51,7 +51,7 @@ class RunWriter {
   [[nodiscard]] emit::RunPlan in_time(const RunJob& job) const;
   [[nodiscard]] std::optional<gcode::Segment> kept_before(const RunJob& job) const;
   [[nodiscard]] bool fits(const RunJob& job) const;
-  void begin(const Piece& piece);
+  void begin(const RunJob& job);
   std::string keep_lines(const Piece& piece);
   Result<std::string> write_as_sliced(const RunJob& job, std::string failure);
   void note_timing(const RunJob& job);

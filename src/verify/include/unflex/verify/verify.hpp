@@ -46,12 +46,26 @@ struct Leeway {
 // Where the timing is free, the nozzle may at its worst stray this many times the tolerance.
 inline constexpr double kTimesTolerance = 1.1;
 
+// A bed that moves along an axis carries what has been printed, and the axis' frequencies fall with
+// it: f = f₀ √(m₀ / (m₀ + m)).
+struct PrintOnBed {
+  Axes<double> moving_mass_g;      // m₀; 0: the axis does not carry the print
+  double filament_g_per_mm = 0.0;  // of the print that lies on the bed
+
+  [[nodiscard]] bool acts() const {
+    return any_axis([](double mass_g) { return mass_g > 0.0; }, moving_mass_g);
+  }
+  // f / f₀ of each axis, once this length of filament has been laid.
+  [[nodiscard]] Axes<double> frequency_shares(double laid_mm) const;
+};
+
 struct Rules {
   gcode::InterpreterOptions interpreter;
   planner::Limits limits;
   planner::FirmwareConfig fixed;
   NozzleModel nozzle;
   std::vector<NozzleModel> plants;  // what else the axes may be
+  PrintOnBed print_on_bed;
   TravelLimits travel;
   double base_max_velocity_mm_s = 600.0;
   // Limits of the acceleration of a run's motors: a fixed one, and one as a multiple of the plan's

@@ -1,0 +1,76 @@
+// A bed that moves and carries the print: its frequency falls while the print grows.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "jobs.hpp"
+#include "paths.hpp"
+#include "unflex/core/progress.hpp"
+#include "unflex/flow/flow.hpp"
+
+namespace unflex::flow {
+namespace {
+
+using testing::complaints;
+using testing::JobFolder;
+
+// The print lays half a gram. On a bed of as little as 1 g its frequency falls by a sixth.
+const std::vector<std::string> kExact = {"dynamics.freq_error=0", "dynamics.y.freq_hz=38"};
+const std::string kBed = "dynamics.y.moving_mass_g=1";
+
+std::vector<std::string> with(std::vector<std::string> overrides,
+                              const std::vector<std::string>& more) {
+  overrides.insert(overrides.end(), more.begin(), more.end());
+  return overrides;
+}
+
+std::string print() {
+  return testing::read_file(std::filesystem::path(test_paths::kData) / "pipeline_star.gcode");
+}
+
+struct Made {
+  report::Report report;
+  std::string text;
+};
+
+Made made(const std::vector<std::string>& overrides, unsigned workers = 2) {
+  const JobFolder folder(print(), overrides);
+  SilentProgress progress;
+  const Result<report::Report> report = compensate(folder.job(workers), progress);
+  EXPECT_TRUE(report.has_value()) << to_string(report.error());
+  EXPECT_EQ(report->violation_count, 0U) << complaints(*report);
+  EXPECT_EQ(report->runs.fallback, 0U) << complaints(*report);
+  return {report.value_or(report::Report{}), folder.output()};
+}
+
+double rms_mm(const report::Report& report) {
+  return report.measured.compensated.extruding.contour_rms_mm;
+}
+
+TEST(AMovingBed, IsCompensatedForItsMassAtEachRun) {
+  const Made empty = made(kExact);
+  const Made loaded = made(with(kExact, {kBed}));
+  EXPECT_LE(rms_mm(loaded.report), 1.3 * rms_mm(empty.report));
+  // Motion for the empty bed is measured on the bed with the print.
+  const JobFolder ignored(print(), with(kExact, {kBed}));
+  ignored.set_output(empty.text);
+  SilentProgress progress;
+  const Result<report::Report> measured = verify(ignored.job(), progress);
+  ASSERT_TRUE(measured) << to_string(measured.error());
+  EXPECT_LE(rms_mm(loaded.report), 0.3 * rms_mm(*measured));
+  EXPECT_EQ(measured->measured.uncompensated.extruding.contour_rms_mm,
+            loaded.report.measured.uncompensated.extruding.contour_rms_mm);
+}
+
+TEST(AMovingBed, IsTheSameForAnyNumberOfWorkers) {
+  EXPECT_EQ(made(with(kExact, {kBed}), 1).text, made(with(kExact, {kBed}), 3).text);
+}
+
+TEST(AMovingBed, OfAWholeTonStaysAsItIs) {
+  EXPECT_EQ(made(with(kExact, {"dynamics.y.moving_mass_g=1e6"})).text, made(kExact).text);
+}
+
+}  // namespace
+}  // namespace unflex::flow
