@@ -45,11 +45,11 @@ void Admission::admit(RunJob& job) {
     return;
   }
   const Piece& piece = job.piece;
-  if (piece.begins_run()) {
-    // Parts of a run meet in motion, so a run has one machine.
-    rules_ = machine_->at(piece.moves.front().segment.start_mm[gcode::E]);
-    nozzle_.set_model(rules_->verify.nozzle);
-  }
+  // The mass in the middle of the piece stands for the whole. Parts of a run meet in motion, but
+  // hardly anything is printed from one to the next.
+  rules_ = machine_->at(0.5 * (piece.moves.front().segment.start_mm[gcode::E] +
+                               piece.moves.back().segment.end_mm[gcode::E]));
+  nozzle_.set_model(rules_->verify.nozzle);
   job.rules = rules_;
   report_->runs.total += piece.begins_run() ? 1 : 0;
   const double asked_accel_mm_s2 = prepare(job);

@@ -67,6 +67,14 @@ void Bundle::take_models() {
 }
 
 void Bundle::set_frequencies(const Axes<double>& shares) {
+  constexpr double kSame = 1e-4;
+  const auto is_same = [](double share, double present) {
+    return std::abs(share - present) < kSame * present;
+  };
+  if (all_axes(is_same, shares, shares_)) {
+    return;
+  }
+  shares_ = shares;
   models_ = given_;
   fastest_rad_s_ = 0.0;
   for (NozzleModel& model : models_) {
@@ -83,10 +91,9 @@ void Bundle::set_frequencies(const Axes<double>& shares) {
 
 void Bundle::keep_first() {
   const NozzleXY first = nozzle();
-  const NozzleModel present = models_.front();
+  const Axes<double> shares = shares_;
   *this = Bundle({given_.front()});
-  models_.front() = present;
-  take_models();
+  set_frequencies(shares);
   set_nozzle(0, first);
 }
 

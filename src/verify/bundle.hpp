@@ -28,8 +28,8 @@ class Bundle {
   explicit Bundle(std::vector<NozzleModel> models);
 
   [[nodiscard]] std::size_t count() const { return models_.size(); }
-  // From now on all frequencies of an axis are this many times those of the models given. The
-  // nozzles' states stay.
+  // From now on all frequencies of an axis are this many times those of the models given, but for
+  // changes of less than a ten-thousandth. The nozzles' states stay.
   void set_frequencies(const Axes<double>& shares);
   // Forgets all nozzles but the first, and their models.
   void keep_first();
@@ -89,7 +89,8 @@ class Bundle {
   [[nodiscard]] DeviationStats stats(const BundleSums& sums, std::size_t number) const;
 
   std::vector<NozzleModel> given_;
-  std::vector<NozzleModel> models_;  // with set_frequencies()
+  Axes<double> shares_{1.0, 1.0};
+  std::vector<NozzleModel> models_;  // with shares_ of the frequencies
   const BundleKernel* kernel_;
   double fastest_rad_s_ = 0.0;
   BundleArrays arrays_;

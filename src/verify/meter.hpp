@@ -80,10 +80,7 @@ class Meter {
   // Keeps the first nozzle alone from now on.
   void drop_others();
   // From now on all frequencies of an axis are this many times those of the models.
-  void set_frequencies(const Axes<double>& shares) {
-    bundle_.set_frequencies(shares);
-    last_look_.reset();
-  }
+  void set_frequencies(const Axes<double>& shares) { bundle_.set_frequencies(shares); }
   // How many others there are, and how far they stray.
   [[nodiscard]] std::size_t others() const { return bundle_.count() - 1; }
   [[nodiscard]] Deviation deviation_of_other(std::size_t number) const {

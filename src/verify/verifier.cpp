@@ -165,15 +165,12 @@ void Verifier::begin_paths(bool compensated) {
   }
 }
 
-// The bed is as heavy in a whole section as where it begins.
-void Verifier::load_bed() {
-  if (!rules_.print_on_bed.acts()) {
-    return;
+// The bed carries what had been laid before the move.
+template <class Hung>
+void Verifier::carry_print(const planner::PlannedMove& move, Hung& nozzles) const {
+  if (rules_.print_on_bed.acts()) {
+    nozzles.set_frequencies(rules_.print_on_bed.frequency_shares(move.segment.start_mm[gcode::E]));
   }
-  const Axes<double> shares = rules_.print_on_bed.frequency_shares(paths_.sliced().filament_mm());
-  for_sliced([&](Nozzles& nozzles) { nozzles.set_frequencies(shares); });
-  emitted_.set_frequencies(shares);
-  kept_.set_frequencies(shares);
 }
 
 void Verifier::begin_section(bool compensated) {
@@ -185,7 +182,6 @@ void Verifier::begin_section(bool compensated) {
   begin_paths(compensated);
   follow_pressure(compensated);
   shape_sliced();
-  load_bed();
   for_sliced([&](Nozzles& nozzles) { nozzles.begin_section(paths_.sliced()); });
   if (compensated) {
     // A run begins at rest, and it has a clock of its own.
@@ -382,6 +378,7 @@ void Verifier::play(const OutputMove& output) {
   if (!compensated && move.segment.length_xy_mm() > 0.0) {
     since_kept_motion_s_ = 0.0;
   }
+  carry_print(move, emitted_);
   emitted_.play(output.laid, move);
   filament_.play(output.laid, start_s);
   if (compensated) {
@@ -397,7 +394,10 @@ void Verifier::play(const OutputMove& output) {
 
 void Verifier::let_original_follow(double until_s) {
   while (const std::optional<planner::PlannedMove> move = paths_.next_sliced(until_s)) {
-    for_sliced([&](Nozzles& nozzles) { nozzles.play(*move); });
+    for_sliced([&](Nozzles& nozzles) {
+      carry_print(*move, nozzles);
+      nozzles.play(*move);
+    });
   }
   double needed_s = original_.main().time_s();
   if (observer_ != nullptr) {
@@ -419,6 +419,7 @@ void Verifier::let_original_follow(double until_s) {
 
 void Verifier::let_kept_follow(double until_s) {
   while (const std::optional<planner::PlannedMove> move = paths_.next_kept(until_s)) {
+    carry_print(*move, kept_);
     kept_.play(*move);
   }
 }

@@ -61,7 +61,8 @@ class Verifier {
   bool next_resting_move(planner::PlannedMove& move);
   bool next_output_move(OutputMove& move);
   bool ends_here(const planner::PlannedMove& move, const Track& file);
-  void load_bed();
+  template <class Hung>
+  void carry_print(const planner::PlannedMove& move, Hung& nozzles) const;
   void begin_section(bool compensated);
   void begin_paths(bool compensated);
   void play_run();

@@ -18,8 +18,8 @@ class MachineModel {
 
   // The rules for the empty bed.
   [[nodiscard]] const RunRules& empty() const { return *empty_; }
-  // The rules for a run that begins when this length of filament lies on the bed, mm. Frequencies
-  // are within 0.05 % of those of its mass.
+  // The rules for a run, or a part of one, while this length of filament lies on the bed, mm.
+  // Frequencies are within 0.05 % of those of its mass.
   [[nodiscard]] std::shared_ptr<const RunRules> at(double printed_mm);
 
  private:
