@@ -131,15 +131,16 @@ class Compensator {
         admission_(machine_, job.input_name, kept, report),
         band_gain_(job_.settings),
         layers_(job.settings.is_timing_free() ? job.settings.timing.min_layer_s : 0.0),
-        queue_(job.workers, machine_.empty().emit.lines.burst_lines > 0),
-        writer_(machine_.empty(), job.input_name, job.settings.max_lines_per_s(), report),
+        queue_(job.workers, machine_.as_given().emit.lines.burst_lines > 0),
+        writer_(machine_.as_given(), job.input_name, job.settings.max_lines_per_s(), report),
         engine_(engines.threaded ? engines.threaded() : nullptr),
         pieces_(
-            streams.input, job.input_name, machine_.empty().verify, streams.slots,
+            streams.input, job.input_name, machine_.as_given().verify, streams.slots,
             [this] { bell_.ring(); }, streams.stop_input),
-        recorder_(recorder_for(job, machine_.empty().verify)),
-        verifier_(machine_.empty().verify, observation_of(*recorder_, machine_.empty().verify),
-                  job.input_name, job.output_name, streams.slots),
+        recorder_(recorder_for(job, machine_.as_given().verify)),
+        verifier_(machine_.as_given().verify,
+                  observation_of(*recorder_, machine_.as_given().verify), job.input_name,
+                  job.output_name, streams.slots),
         pool_(std::max(job.workers, 1U), streams.slots) {
     if (engines.threaded && engines.second) {
       gaps_.emplace();

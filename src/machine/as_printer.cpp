@@ -52,12 +52,13 @@ dynamics::FlexibleAxis behind(const dynamics::FlexibleAxis& axis, double freq_hz
   return freq_hz > 0.0 ? axis.followed_by(2.0 * std::numbers::pi * freq_hz, damping_ratio) : axis;
 }
 
-Settings with_print(Settings settings, double printed_g) {
+Settings with_frequencies(Settings settings, const Axes<double>& shares) {
   for_each_axis(
-      [&](AxisDynamics& axis, double& second_hz) {
-        const double share = axis.frequency_share(printed_g);
+      [](AxisDynamics& axis, double& second_hz, double share) {
         axis.freq_hz *= share;
         second_hz *= share;
+        axis.moving_mass_g = 0.0;
+        axis.map.clear();
         for (ModeSettings& mode : axis.modes) {
           mode.freq_hz *= share;
         }
@@ -67,7 +68,7 @@ Settings with_print(Settings settings, double printed_g) {
           }
         }
       },
-      settings.dynamics, settings.second.freq_hz);
+      settings.dynamics, settings.second.freq_hz, shares);
   return settings;
 }
 

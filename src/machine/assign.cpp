@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "key_table.hpp"
 #include "key_values.hpp"
@@ -283,6 +284,69 @@ std::string store(const Value& value, const Key& key, std::vector<PlantSettings>
         key.name, sum);
   }
   target = std::move(plants);
+  return {};
+}
+
+// The numbers of a list of a map; empty if it is no such list.
+std::vector<double> points_of(const Table& table, std::string_view name) {
+  const NamedValue* const given = find(table, name);
+  const auto* list =
+      given != nullptr ? std::get_if<std::vector<Value>>(&given->value.content) : nullptr;
+  std::vector<double> points;
+  for (std::size_t i = 0; list != nullptr && i < list->size(); ++i) {
+    const auto* number = std::get_if<double>(&(*list)[i].content);
+    if (number == nullptr || !std::isfinite(*number)) {
+      return {};
+    }
+    points.push_back(*number);
+  }
+  return points;
+}
+
+std::string store(const Table& table, const std::string& whose, FrequencyMap& map) {
+  constexpr std::size_t kMostPoints = 100;
+  constexpr Bounds kFrequencies{.min = 1.0, .max = 1000.0};
+  for (const NamedValue& given : table) {
+    if (given.name != "along" && given.name != "at_mm" && given.name != "freq_hz") {
+      return fmt::format("{}: unknown value '{}'; a map has along, at_mm and freq_hz", whose,
+                         given.name);
+    }
+  }
+  const NamedValue* const along = find(table, "along");
+  const auto* axis = along != nullptr ? std::get_if<std::string>(&along->value.content) : nullptr;
+  if (axis == nullptr || *axis != "z") {
+    return fmt::format("{}: along must be \"z\"; unflex follows no map along X or Y yet", whose);
+  }
+  map.at_mm = points_of(table, "at_mm");
+  map.freq_hz = points_of(table, "freq_hz");
+  if (map.at_mm.size() < 2 || map.at_mm.size() > kMostPoints ||
+      map.at_mm.size() != map.freq_hz.size()) {
+    return fmt::format("{}: at_mm and freq_hz must be lists of 2 to {} numbers, as many of each",
+                       whose, kMostPoints);
+  }
+  if (std::ranges::adjacent_find(map.at_mm, std::greater_equal<>{}) != map.at_mm.end()) {
+    return fmt::format("{}: at_mm must increase from point to point", whose);
+  }
+  for (const double hz : map.freq_hz) {
+    if (!kFrequencies.contains(hz)) {
+      return fmt::format("{}: freq_hz has {}, but must be 1 to 1000", whose, hz);
+    }
+  }
+  return {};
+}
+
+std::string store(const Value& value, const Key& key, std::vector<FrequencyMap>& target) {
+  const auto tables = tables_of(value, 1, 1);
+  if (!tables) {
+    return fmt::format("{} must be one table, [[{}]], with along, at_mm and freq_hz", key.name,
+                       key.name);
+  }
+  std::vector<FrequencyMap> maps(1);
+  if (std::string wrong = store(*tables->front(), std::string(key.name), maps.front());
+      !wrong.empty()) {
+    return wrong;
+  }
+  target = std::move(maps);
   return {};
 }
 

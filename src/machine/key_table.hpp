@@ -29,7 +29,7 @@ using Member =
                  std::optional<bool>& (*)(Draft&), Firmware& (*)(Draft&), Kinematics& (*)(Draft&),
                  std::optional<Range>& (*)(Draft&), std::optional<Motors::Row>& (*)(Draft&),
                  std::string& (*)(Draft&), std::vector<ModeSettings>& (*)(Draft&),
-                 std::vector<PlantSettings>& (*)(Draft&)>;
+                 std::vector<PlantSettings>& (*)(Draft&), std::vector<FrequencyMap>& (*)(Draft&)>;
 
 struct Key {
   std::string_view name;

@@ -29,6 +29,10 @@ std::optional<std::string> text_of(const std::vector<PlantSettings>& value) {
   return value.empty() ? std::nullopt : std::optional(to_toml_value(value));
 }
 
+std::optional<std::string> text_of(const std::vector<FrequencyMap>& value) {
+  return value.empty() ? std::nullopt : std::optional(to_toml_value(value));
+}
+
 std::string bounds_text(const Bounds& bounds) {
   const std::string low = std::isfinite(bounds.min)
                               ? fmt::format("{}{}", bounds.min_open ? "> " : "≥ ", bounds.min)
@@ -77,6 +81,16 @@ std::string to_toml_value(const std::vector<PlantSettings>& value) {
   return "[" + text + "]";
 }
 
+std::string to_toml_value(const std::vector<FrequencyMap>& value) {
+  std::string text;
+  for (const FrequencyMap& map : value) {
+    text +=
+        fmt::format("{}{{along = \"{}\", at_mm = [{}], freq_hz = [{}]}}", text.empty() ? "" : ", ",
+                    map.along, fmt::join(map.at_mm, ", "), fmt::join(map.freq_hz, ", "));
+  }
+  return "[" + text + "]";
+}
+
 std::optional<std::string> own_value(const Key& key, Draft& draft) {
   return std::visit([&](auto member) { return text_of(member(draft)); }, key.member);
 }
@@ -113,6 +127,9 @@ std::string range_text(const Key& key) {
   }
   if (std::holds_alternative<std::vector<ModeSettings>& (*)(Draft&)>(key.member)) {
     return "2 or 3 modes";
+  }
+  if (std::holds_alternative<std::vector<FrequencyMap>& (*)(Draft&)>(key.member)) {
+    return "2 to 100 points";
   }
   if (std::holds_alternative<std::vector<PlantSettings>& (*)(Draft&)>(key.member)) {
     return "shares > 0 with a sum < 1, 1 to 3 modes each";

@@ -18,6 +18,7 @@ namespace unflex::machine {
 [[nodiscard]] std::string to_toml_value(const Motors::Row& value);
 [[nodiscard]] std::string to_toml_value(const std::vector<ModeSettings>& value);
 [[nodiscard]] std::string to_toml_value(const std::vector<PlantSettings>& value);
+[[nodiscard]] std::string to_toml_value(const std::vector<FrequencyMap>& value);
 
 // The value the key itself holds; nullopt while unset.
 [[nodiscard]] std::optional<std::string> own_value(const Key& key, Draft& draft);

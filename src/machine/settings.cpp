@@ -159,8 +159,8 @@ double Settings::filament_g_per_mm() const {
   return kCm3PerMm3 * extruder.filament_density_g_cm3 * filament_area_mm2();
 }
 
-bool Settings::carries_print() const {
-  return any_axis([](const AxisDynamics& axis) { return axis.moving_mass_g > 0.0; }, dynamics);
+bool Settings::changes() const {
+  return any_axis([](const AxisDynamics& axis) { return axis.changes(); }, dynamics);
 }
 
 double Settings::filament_area_mm2() const {
@@ -268,9 +268,22 @@ double Settings::base_max_accel_mm_s2(double asked_mm_s2) const {
 }
 
 // f = f₀ √(m₀ / (m₀ + m)): the belt stays as stiff while the mass on it grows.
-double AxisDynamics::frequency_share(double printed_g) const {
-  return moving_mass_g > 0.0 ? std::sqrt(moving_mass_g / (moving_mass_g + std::max(printed_g, 0.0)))
-                             : 1.0;
+double AxisDynamics::frequency_share(const MachineState& state) const {
+  double share = moving_mass_g > 0.0
+                     ? std::sqrt(moving_mass_g / (moving_mass_g + std::max(state.printed_g, 0.0)))
+                     : 1.0;
+  for (const FrequencyMap& one : map) {
+    const auto above = std::ranges::upper_bound(one.at_mm, state.height_mm);
+    const auto next = static_cast<std::size_t>(above - one.at_mm.begin());
+    double hz = next == 0 ? one.freq_hz.front() : one.freq_hz[next - 1];
+    if (next > 0 && next < one.at_mm.size()) {
+      hz = std::lerp(
+          hz, one.freq_hz[next],
+          (state.height_mm - one.at_mm[next - 1]) / (one.at_mm[next] - one.at_mm[next - 1]));
+    }
+    share *= hz / freq_hz;
+  }
+  return share;
 }
 
 double AxisDynamics::slowest_hz() const {
@@ -306,6 +319,10 @@ std::string AxisDynamics::description() const {
   }
   if (moving_mass_g > 0.0) {
     text += fmt::format(", on a bed of {:.4g} g that gets heavier", moving_mass_g);
+  }
+  for (const FrequencyMap& one : map) {
+    text +=
+        fmt::format(", {:.4g} to {:.4g} Hz by the height", one.freq_hz.front(), one.freq_hz.back());
   }
   return text;
 }

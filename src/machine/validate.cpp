@@ -292,6 +292,23 @@ Status check_kinematics(const Draft& draft) {
   return {};
 }
 
+// Checks that a map of frequencies is for an axis with one frequency.
+Status check_maps(const Draft& draft) {
+  const auto check = [&](std::string_view axis, const AxisDynamics& dynamics) -> Status {
+    if (dynamics.map.empty() || dynamics.modes.empty()) {
+      return {};
+    }
+    const std::string map = fmt::format("dynamics.{}.map", axis);
+    const std::string mode = fmt::format("dynamics.{}.mode", axis);
+    return conflict(
+        draft, {map, mode},
+        fmt::format("{} tells one frequency at each height, and {} several; take one of "
+                    "them away",
+                    map, mode));
+  };
+  return each_in_turn(check, kAxisKeys, draft.settings.dynamics);
+}
+
 constexpr std::array<std::string_view, Motors::kCount> kJoints = {
     "kinematics.joint_a", "kinematics.joint_b", "kinematics.joint_c"};
 
@@ -467,8 +484,8 @@ Status resolve_dynamics(Draft& draft) {
 }
 
 Status check_consistency(const Draft& draft) {
-  for (auto* check : {check_printer, check_shaper, check_kinematics, check_joints, check_base,
-                      check_emission, check_second, check_timing, check_grid}) {
+  for (auto* check : {check_printer, check_shaper, check_kinematics, check_joints, check_maps,
+                      check_base, check_emission, check_second, check_timing, check_grid}) {
     if (Status checked = check(draft); !checked) {
       return checked;
     }

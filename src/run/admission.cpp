@@ -27,12 +27,19 @@ double largest_motor_accel(const std::vector<planner::PlannedMove>& moves, const
   return largest;
 }
 
+machine::MachineState state_in_middle(const Piece& run, double filament_g_per_mm) {
+  const gcode::Position& begin = run.moves.front().segment.start_mm;
+  const gcode::Position& end = run.moves.back().segment.end_mm;
+  return {filament_g_per_mm * 0.5 * (begin[gcode::E] + end[gcode::E]),
+          0.5 * (begin[gcode::Z] + end[gcode::Z])};
+}
+
 }  // namespace
 
 Admission::Admission(MachineModel& machine, std::string input_name,
                      const std::vector<verify::BlamedRun>& kept, report::Report& report)
     : machine_(&machine),
-      rules_(machine.at(0.0)),
+      rules_(machine.at({})),
       input_name_(std::move(input_name)),
       kept_(&kept),
       report_(&report),
@@ -45,10 +52,9 @@ void Admission::admit(RunJob& job) {
     return;
   }
   const Piece& piece = job.piece;
-  // The mass in the middle of the piece stands for the whole. Parts of a run meet in motion, but
-  // hardly anything is printed from one to the next.
-  rules_ = machine_->at(0.5 * (piece.moves.front().segment.start_mm[gcode::E] +
-                               piece.moves.back().segment.end_mm[gcode::E]));
+  // The middle of the piece stands for the whole. Parts of a run meet in motion, but hardly
+  // anything changes from one to the next.
+  rules_ = machine_->at(state_in_middle(piece, rules_->settings.filament_g_per_mm()));
   nozzle_.set_model(rules_->verify.nozzle);
   job.rules = rules_;
   report_->runs.total += piece.begins_run() ? 1 : 0;

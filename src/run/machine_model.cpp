@@ -1,11 +1,6 @@
-// Notation:
-//   m   mass of the print      m₀   the least mass of an axis that carries it
-//   c   ln(f₀ / f) = ½ ln(1 + m / m₀), which a run's rules are made for in steps of kStep
 #include "unflex/run/machine_model.hpp"
 
-#include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "unflex/core/math.hpp"
@@ -14,16 +9,8 @@
 namespace unflex::run {
 namespace {
 
+// Rules are made for frequencies that are this far apart, as a difference of logarithms.
 constexpr double kStep = 1e-3;
-
-double least_mass_g(const machine::Settings& settings) {
-  return least_of_axes(
-      [](const machine::AxisDynamics& axis) {
-        return axis.moving_mass_g > 0.0 ? axis.moving_mass_g
-                                        : std::numeric_limits<double>::infinity();
-      },
-      settings.dynamics);
-}
 
 }  // namespace
 
@@ -31,23 +18,26 @@ MachineModel::MachineModel(const machine::Settings& settings,
                            std::function<RunRules(const machine::Settings&)> rules_for)
     : settings_(settings),
       rules_for_(std::move(rules_for)),
-      empty_(std::make_shared<RunRules>(rules_for_(settings))),
-      present_(empty_) {}
+      given_(std::make_shared<RunRules>(rules_for_(settings))),
+      present_(given_) {}
 
-std::shared_ptr<const RunRules> MachineModel::at(double printed_mm) {
-  if (!settings_.carries_print()) {
-    return empty_;
+std::shared_ptr<const RunRules> MachineModel::at(const machine::MachineState& state) {
+  if (!settings_.changes()) {
+    return given_;
   }
-  const double mass_g = std::max(printed_mm, 0.0) * settings_.filament_g_per_mm();
-  const double least_g = least_mass_g(settings_);
-  const auto step =
-      static_cast<std::int64_t>(std::round(0.5 * math::log(1.0 + mass_g / least_g) / kStep));
-  if (step != step_) {
-    step_ = step;
-    const double share = math::exp(2.0 * kStep * static_cast<double>(step));
-    present_ = step == 0 ? empty_
-                         : std::make_shared<RunRules>(
-                               rules_for_(machine::with_print(settings_, least_g * (share - 1.0))));
+  const auto step_of = [&](const machine::AxisDynamics& axis) {
+    return static_cast<std::int64_t>(std::round(math::log(axis.frequency_share(state)) / kStep));
+  };
+  const auto steps = map_axes(step_of, settings_.dynamics);
+  if (steps != steps_) {
+    steps_ = steps;
+    const auto share_of = [](std::int64_t step) {
+      return math::exp(kStep * static_cast<double>(step));
+    };
+    const bool is_given = steps == on_all_axes<std::int64_t>(0);
+    present_ = is_given ? given_
+                        : std::make_shared<RunRules>(rules_for_(
+                              machine::with_frequencies(settings_, map_axes(share_of, steps))));
   }
   return present_;
 }

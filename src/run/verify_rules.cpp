@@ -28,6 +28,17 @@ std::vector<verify::NozzleModel> nozzles_of_plants(const machine::Settings& sett
   return nozzles;
 }
 
+verify::AxisChange change_of(const machine::AxisDynamics& axis) {
+  verify::AxisChange change{axis.moving_mass_g, {}, {}};
+  for (const machine::FrequencyMap& map : axis.map) {
+    change.heights_mm = map.at_mm;
+    for (const double freq_hz : map.freq_hz) {
+      change.shares.push_back(freq_hz / axis.freq_hz);
+    }
+  }
+  return change;
+}
+
 }  // namespace
 
 verify::StepRules step_rules(const machine::Settings& settings) {
@@ -50,10 +61,7 @@ verify::Rules verify_rules(const machine::Settings& settings) {
   rules.nozzle = {machine::nozzle_axes(settings), settings.verify.step_ms * 1e-3,
                   settings.verify.hold_s};
   rules.plants = nozzles_of_plants(settings, rules.nozzle);
-  rules.print_on_bed = {
-      map_axes([](const machine::AxisDynamics& axis) { return axis.moving_mass_g; },
-               settings.dynamics),
-      settings.filament_g_per_mm()};
+  rules.change = {map_axes(change_of, settings.dynamics), settings.filament_g_per_mm()};
   for_each_axis(
       [](const std::optional<machine::Range>& travel, verify::TravelRange& range) {
         range.min_assumed = !travel;

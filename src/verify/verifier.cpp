@@ -165,11 +165,11 @@ void Verifier::begin_paths(bool compensated) {
   }
 }
 
-// The bed carries what had been laid before the move.
+// The machine is in a move as where the move begins.
 template <class Hung>
-void Verifier::carry_print(const planner::PlannedMove& move, Hung& nozzles) const {
-  if (rules_.print_on_bed.acts()) {
-    nozzles.set_frequencies(rules_.print_on_bed.frequency_shares(move.segment.start_mm[gcode::E]));
+void Verifier::change_machine(const planner::PlannedMove& move, Hung& nozzles) const {
+  if (rules_.change.acts()) {
+    nozzles.set_frequencies(rules_.change.frequency_shares(move.segment.start_mm));
   }
 }
 
@@ -378,7 +378,7 @@ void Verifier::play(const OutputMove& output) {
   if (!compensated && move.segment.length_xy_mm() > 0.0) {
     since_kept_motion_s_ = 0.0;
   }
-  carry_print(move, emitted_);
+  change_machine(move, emitted_);
   emitted_.play(output.laid, move);
   filament_.play(output.laid, start_s);
   if (compensated) {
@@ -395,7 +395,7 @@ void Verifier::play(const OutputMove& output) {
 void Verifier::let_original_follow(double until_s) {
   while (const std::optional<planner::PlannedMove> move = paths_.next_sliced(until_s)) {
     for_sliced([&](Nozzles& nozzles) {
-      carry_print(*move, nozzles);
+      change_machine(*move, nozzles);
       nozzles.play(*move);
     });
   }
@@ -419,7 +419,7 @@ void Verifier::let_original_follow(double until_s) {
 
 void Verifier::let_kept_follow(double until_s) {
   while (const std::optional<planner::PlannedMove> move = paths_.next_kept(until_s)) {
-    carry_print(*move, kept_);
+    change_machine(*move, kept_);
     kept_.play(*move);
   }
 }

@@ -62,7 +62,7 @@ class Verifier {
   bool next_output_move(OutputMove& move);
   bool ends_here(const planner::PlannedMove& move, const Track& file);
   template <class Hung>
-  void carry_print(const planner::PlannedMove& move, Hung& nozzles) const;
+  void change_machine(const planner::PlannedMove& move, Hung& nozzles) const;
   void begin_section(bool compensated);
   void begin_paths(bool compensated);
   void play_run();

@@ -22,6 +22,8 @@ SEVERAL = re.compile(r"# (mode|plant) = ")
 # Unset, these limit nothing, so their comments show an example.
 NO_DEFAULT = re.compile(r"# (written|max_flow_mm3_s|max_speed_mm_s|outer_wall_tolerance_um|gain_c|advance_s|time_constant_s|"
                         r"dead_time_s|heater_w) = ")
+# For other machines than the example's.
+OTHERS = re.compile(r"# (joint_[abc]|map) = ")
 MODAL = re.compile(r"(# )?(freq_hz|damping_ratio) = ")
 
 
@@ -32,7 +34,8 @@ def text_of(folder, name):
 
 def uncommented(lines):
     """The lines with each key and section that is a comment put in force."""
-    return [re.sub(r"^# (?=\[[a-z.]+\]|\w+ = )", "", line) for line in lines]
+    return [line if OTHERS.match(line) else re.sub(r"^# (?=\[[a-z.]+\]|\w+ = )", "", line)
+            for line in lines]
 
 
 class PrinterFile(unittest.TestCase):

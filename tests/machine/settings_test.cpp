@@ -576,5 +576,37 @@ TEST(Plants, ThatAreNoneNameTheirPlace) {
   EXPECT_THAT(refusal("3"), HasSubstr("1 to 8 tables"));
 }
 
+TEST(AFrequencyMap, IsReadFromATableOfPoints) {
+  const Settings s =
+      read("[[dynamics.y.map]]\nalong = \"z\"\nat_mm = [0, 100, 200]\nfreq_hz = [45, 42.5, 40]\n");
+  ASSERT_EQ(s.dynamics.y.map.size(), 1U);
+  EXPECT_EQ(s.dynamics.y.map[0].at_mm, (std::vector<double>{0.0, 100.0, 200.0}));
+  EXPECT_EQ(s.dynamics.y.map[0].freq_hz, (std::vector<double>{45.0, 42.5, 40.0}));
+  EXPECT_TRUE(s.changes());
+  EXPECT_FALSE(Settings{}.changes());
+}
+
+TEST(AFrequencyMap, ThatIsWrongIsRefusedWithItsPlace) {
+  const auto error = [](const std::string& text) {
+    const Result<Settings> settings = parse("[limits]\n[[dynamics.x.map]]\n" + text, "p.toml", {});
+    return settings ? std::string("none") : to_string(settings.error());
+  };
+  using ::testing::HasSubstr;
+  EXPECT_THAT(error("along = \"x\"\nat_mm = [0, 1]\nfreq_hz = [40, 41]\n"),
+              HasSubstr("along must be \"z\""));
+  EXPECT_THAT(error("along = \"z\"\nat_mm = [0, 1]\nfreq_hz = [40]\n"),
+              HasSubstr("must be lists of 2 to 100 numbers, as many of each"));
+  EXPECT_THAT(error("along = \"z\"\nat_mm = [1, 1]\nfreq_hz = [40, 41]\n"),
+              HasSubstr("at_mm must increase"));
+  EXPECT_THAT(error("along = \"z\"\nat_mm = [0, 1]\nfreq_hz = [40, 0.5]\n"),
+              HasSubstr("freq_hz has 0.5, but must be 1 to 1000"));
+  EXPECT_THAT(error("along = \"z\"\nat_mm = [0, 1]\nfreq_hz = [40, 41]\nhz = 3\n"),
+              HasSubstr("unknown value 'hz'"));
+  EXPECT_THAT(error("along = \"z\"\nat_mm = [0, 1]\nfreq_hz = [40, 41]\n"
+                    "[[dynamics.x.mode]]\nfreq_hz = 40\ndamping_ratio = 0.1\ngain = 0.5\n"
+                    "[[dynamics.x.mode]]\nfreq_hz = 60\ndamping_ratio = 0.1\ngain = 0.5\n"),
+              HasSubstr("tells one frequency at each height"));
+}
+
 }  // namespace
 }  // namespace unflex::machine

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "jobs.hpp"
 #include "unflex/machine/as_printer.hpp"
@@ -27,35 +28,50 @@ TEST(AMovingBed, SwingsSlowerByTheRootOfItsMass) {
   settings.dynamics.y.freq_hz = 38.0;
   settings.dynamics.y.moving_mass_g = 500.0;
   MachineModel machine(settings, rules_for);
-  const double mm = 250.0 / settings.filament_g_per_mm();
-  EXPECT_NEAR(y_hz(*machine.at(mm)), 31.0269, 0.0005 * 31.0);
-  EXPECT_NEAR(machine.at(mm)->verify.nozzle.y.slowest_rad_s(), 2.0 * std::numbers::pi * 31.0269,
-              0.0005 * 2.0 * std::numbers::pi * 31.0);
-  EXPECT_EQ(machine.at(mm)->settings.dynamics.x.freq_hz, settings.dynamics.x.freq_hz);
-  EXPECT_EQ(y_hz(machine.empty()), 38.0);
-  EXPECT_EQ(y_hz(*machine.at(0.0)), 38.0);
+  const machine::MachineState printed{.printed_g = 250.0};
+  EXPECT_NEAR(y_hz(*machine.at(printed)), 31.0269, 0.0005 * 31.0);
+  EXPECT_NEAR(machine.at(printed)->verify.nozzle.y.slowest_rad_s(),
+              2.0 * std::numbers::pi * 31.0269, 0.0005 * 2.0 * std::numbers::pi * 31.0);
+  EXPECT_EQ(machine.at(printed)->settings.dynamics.x.freq_hz, settings.dynamics.x.freq_hz);
+  EXPECT_EQ(y_hz(machine.as_given()), 38.0);
+  EXPECT_EQ(y_hz(*machine.at({})), 38.0);
 }
 
-TEST(AMovingBed, KeepsWithinATwentiethOfAPercent) {
+// The frequencies are linear between two heights and constant beyond them.
+TEST(AMapOfHeights, GivesTheFrequencyOfTheHeight) {
+  machine::Settings settings = flow::testing::settings();
+  settings.dynamics.x.freq_hz = 45.0;
+  settings.dynamics.x.map = {{"z", {0.0, 100.0, 200.0}, {45.0, 42.5, 30.0}}};
+  MachineModel machine(settings, rules_for);
+  for (const auto& [height_mm, hz] :
+       {std::pair{-5.0, 45.0}, std::pair{0.0, 45.0}, std::pair{50.0, 43.75}, std::pair{100.0, 42.5},
+        std::pair{150.0, 36.25}, std::pair{200.0, 30.0}, std::pair{300.0, 30.0}}) {
+    const auto rules = machine.at({.height_mm = height_mm});
+    EXPECT_NEAR(rules->settings.dynamics.x.freq_hz, hz, 5.1e-4 * hz) << height_mm;
+  }
+}
+
+TEST(AMachineThatChanges, KeepsWithinATwentiethOfAPercent) {
   machine::Settings settings = flow::testing::settings();
   settings.dynamics.x.moving_mass_g = 800.0;
+  settings.dynamics.x.map = {{"z", {0.0, 250.0}, {settings.dynamics.x.freq_hz, 60.0}}};
   settings.dynamics.y.moving_mass_g = 300.0;
   MachineModel machine(settings, rules_for);
-  for (double mm = 0.0; mm < 400e3; mm += 7919.0) {
-    const double printed_g = mm * settings.filament_g_per_mm();
-    const auto rules = machine.at(mm);
+  for (double printed_g = 0.0; printed_g < 1200.0; printed_g += 23.7) {
+    const machine::MachineState state{printed_g, 0.31 * printed_g};
+    const auto rules = machine.at(state);
     for (std::size_t axis = 0; axis < 2; ++axis) {
       const double exact_hz =
-          settings.dynamics[axis].freq_hz * settings.dynamics[axis].frequency_share(printed_g);
-      EXPECT_NEAR(rules->settings.dynamics[axis].freq_hz / exact_hz, 1.0, 5.1e-4) << mm;
+          settings.dynamics[axis].freq_hz * settings.dynamics[axis].frequency_share(state);
+      EXPECT_NEAR(rules->settings.dynamics[axis].freq_hz / exact_hz, 1.0, 5.1e-4) << printed_g;
     }
   }
 }
 
-TEST(AMachineWhoseBedStands, HasOneSetOfRules) {
+TEST(AMachineThatStays, HasOneSetOfRules) {
   MachineModel machine(flow::testing::settings(), rules_for);
-  EXPECT_EQ(machine.at(0.0), machine.at(1e6));
-  EXPECT_EQ(machine.at(0.0).get(), &machine.empty());
+  EXPECT_EQ(machine.at({}), machine.at({1e6, 1e3}));
+  EXPECT_EQ(machine.at({}).get(), &machine.as_given());
 }
 
 }  // namespace

@@ -589,14 +589,27 @@ TEST(PressureAdvance, IsToBeAsSlicedWhereFilamentIsLaid) {
 }
 
 // 250 g on a bed of 500 g: 38 Hz become 31.03.
-TEST(PrintOnABed, MakesItSwingSlowerByTheRootOfItsMass) {
-  const PrintOnBed bed{{0.0, 500.0}, 3e-3};
-  EXPECT_TRUE(bed.acts());
-  EXPECT_DOUBLE_EQ(bed.frequency_shares(0.0).y, 1.0);
-  EXPECT_NEAR(38.0 * bed.frequency_shares(250.0 / 3e-3).y, 31.0269, 1e-4);
-  EXPECT_EQ(bed.frequency_shares(250.0 / 3e-3).x, 1.0);
-  EXPECT_EQ(bed.frequency_shares(-5.0).y, 1.0) << "filament drawn back";
-  EXPECT_FALSE(PrintOnBed{}.acts());
+TEST(AMachineThatChanges, SwingsSlowerByTheRootOfItsMass) {
+  const MachineChange change{{{}, {500.0, {}, {}}}, 3e-3};
+  EXPECT_TRUE(change.acts());
+  EXPECT_DOUBLE_EQ(change.frequency_shares({}).y, 1.0);
+  EXPECT_NEAR(38.0 * change.frequency_shares({0.0, 0.0, 0.0, 250.0 / 3e-3}).y, 31.0269, 1e-4);
+  EXPECT_EQ(change.frequency_shares({0.0, 0.0, 0.0, 250.0 / 3e-3}).x, 1.0);
+  EXPECT_EQ(change.frequency_shares({0.0, 0.0, 0.0, -5.0}).y, 1.0) << "filament drawn back";
+  EXPECT_FALSE(MachineChange{}.acts());
+}
+
+TEST(AMachineThatChanges, FollowsItsHeightsFromPointToPoint) {
+  const MachineChange change{{{0.0, {10.0, 20.0, 60.0}, {1.0, 0.9, 0.5}}, {}}, 0.0};
+  EXPECT_TRUE(change.acts());
+  const auto share = [&](double z_mm) { return change.frequency_shares({0.0, 0.0, z_mm, 0.0}).x; };
+  EXPECT_DOUBLE_EQ(share(0.0), 1.0);
+  EXPECT_DOUBLE_EQ(share(10.0), 1.0);
+  EXPECT_DOUBLE_EQ(share(15.0), 0.95);
+  EXPECT_DOUBLE_EQ(share(20.0), 0.9);
+  EXPECT_DOUBLE_EQ(share(40.0), 0.7);
+  EXPECT_DOUBLE_EQ(share(60.0), 0.5);
+  EXPECT_DOUBLE_EQ(share(900.0), 0.5);
 }
 
 }  // namespace

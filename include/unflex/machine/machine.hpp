@@ -216,6 +216,20 @@ struct PlantSettings {
 // A printer file gives either freq_hz and damping_ratio, or mass_g, stiffness_n_mm and
 // damping_n_s_mm, which are converted when read, or several modes. Then freq_hz and damping_ratio
 // are those of the mode with the largest gain.
+// The frequency of an axis at some heights of the nozzle. Between two points it is linear, and
+// beyond the first and the last one constant.
+struct FrequencyMap {
+  std::string along = "z";
+  std::vector<double> at_mm;    // increasing
+  std::vector<double> freq_hz;  // one for each of at_mm
+};
+
+// All that an axis' frequencies may depend on while a print goes on.
+struct MachineState {
+  double printed_g = 0.0;  // lies on the bed
+  double height_mm = 0.0;  // of the nozzle
+};
+
 struct AxisDynamics {
   double freq_hz = 45.0;
   double damping_ratio = 0.06;
@@ -225,8 +239,11 @@ struct AxisDynamics {
   // those of the empty bed. 0: the axis does not carry the print.
   double moving_mass_g = 0.0;
 
-  // The share of its empty frequency that the axis has with this mass of print on it.
-  [[nodiscard]] double frequency_share(double printed_g) const;
+  std::vector<FrequencyMap> map = {};  // at most one for each direction
+
+  // The frequency in this state, relative to freq_hz.
+  [[nodiscard]] double frequency_share(const MachineState& state) const;
+  [[nodiscard]] bool changes() const { return moving_mass_g > 0.0 || !map.empty(); }
   [[nodiscard]] double slowest_hz() const;
   [[nodiscard]] double fastest_hz() const;
   // The node period at which a window follows all modes: a twentieth of the period of one with a
@@ -406,8 +423,8 @@ struct Settings {
   [[nodiscard]] double least_speed_step_mm_s() const;
   [[nodiscard]] double filament_area_mm2() const;
   [[nodiscard]] double filament_g_per_mm() const;
-  // Whether some axis' frequencies fall while the print grows.
-  [[nodiscard]] bool carries_print() const;
+  // Whether some axis' frequencies change while a print goes on.
+  [[nodiscard]] bool changes() const;
   [[nodiscard]] double max_extrude_cross_section_mm2() const;
   [[nodiscard]] double max_extrude_only_velocity_mm_s() const;
   [[nodiscard]] double max_extrude_only_accel_mm_s2() const;

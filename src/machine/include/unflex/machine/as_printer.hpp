@@ -23,8 +23,8 @@ inline constexpr double kGrid_mm = 1e-4;
 // The grid on which lines end, mm: that one, or steps.
 [[nodiscard]] double grid_mm(const Settings& settings);
 
-// The settings with the axes' frequencies as they are while this mass of print lies on the bed.
-[[nodiscard]] Settings with_print(Settings settings, double printed_g);
+// The settings with all frequencies of an axis this many times as high, and constant.
+[[nodiscard]] Settings with_frequencies(Settings settings, const Axes<double>& shares);
 
 [[nodiscard]] dynamics::FlexibleAxis flexible_axis(const std::vector<ModeSettings>& settings);
 [[nodiscard]] dynamics::FlexibleAxis flexible_axis(const AxisDynamics& dynamics);

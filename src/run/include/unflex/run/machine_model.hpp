@@ -1,4 +1,5 @@
-// The machine as it is while a run is printed: a bed carries all that has been printed so far.
+// The machine as it is while a run is printed: its frequencies may fall while the print grows, or
+// change with the height.
 #pragma once
 
 #include <cstdint>
@@ -16,18 +17,18 @@ class MachineModel {
   MachineModel(const machine::Settings& settings,
                std::function<RunRules(const machine::Settings&)> rules_for);
 
-  // The rules for the empty bed.
-  [[nodiscard]] const RunRules& empty() const { return *empty_; }
-  // The rules for a run, or a part of one, while this length of filament lies on the bed, mm.
-  // Frequencies are within 0.05 % of those of its mass.
-  [[nodiscard]] std::shared_ptr<const RunRules> at(double printed_mm);
+  // The rules for the frequencies that the settings give.
+  [[nodiscard]] const RunRules& as_given() const { return *given_; }
+  // The rules for a run, or a part of one, in this state. Frequencies are within 0.05 % of the
+  // state's.
+  [[nodiscard]] std::shared_ptr<const RunRules> at(const machine::MachineState& state);
 
  private:
   machine::Settings settings_;
   std::function<RunRules(const machine::Settings&)> rules_for_;
-  std::shared_ptr<const RunRules> empty_;
+  std::shared_ptr<const RunRules> given_;
   std::shared_ptr<const RunRules> present_;
-  std::int64_t step_ = 0;  // of present_
+  Axes<std::int64_t> steps_{0, 0};  // of present_
 };
 
 }  // namespace unflex::run

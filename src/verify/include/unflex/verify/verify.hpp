@@ -46,17 +46,25 @@ struct Leeway {
 // Where the timing is free, the nozzle may at its worst stray this many times the tolerance.
 inline constexpr double kTimesTolerance = 1.1;
 
-// A bed that moves along an axis carries what has been printed, and the axis' frequencies fall with
-// it: f = f₀ √(m₀ / (m₀ + m)).
-struct PrintOnBed {
-  Axes<double> moving_mass_g;      // m₀; 0: the axis does not carry the print
+// What changes the frequency f of an axis while a print goes on: a bed that moves along the axis
+// and carries the print, f = f₀ √(m₀ / (m₀ + m)), and the height of the nozzle.
+struct AxisChange {
+  double moving_mass_g = 0.0;      // m₀; 0: the axis does not carry the print
+  std::vector<double> heights_mm;  // increasing; empty: f is the same at all heights
+  std::vector<double> shares;  // f / f₀ there, linear between two heights, constant beyond them
+};
+
+struct MachineChange {
+  Axes<AxisChange> axes;
   double filament_g_per_mm = 0.0;  // of the print that lies on the bed
 
   [[nodiscard]] bool acts() const {
-    return any_axis([](double mass_g) { return mass_g > 0.0; }, moving_mass_g);
+    return any_axis(
+        [](const AxisChange& axis) { return axis.moving_mass_g > 0.0 || !axis.heights_mm.empty(); },
+        axes);
   }
-  // f / f₀ of each axis, once this length of filament has been laid.
-  [[nodiscard]] Axes<double> frequency_shares(double laid_mm) const;
+  // f / f₀ of each axis where the machine is, and all filament so far has been laid.
+  [[nodiscard]] Axes<double> frequency_shares(const gcode::Position& at) const;
 };
 
 struct Rules {
@@ -65,7 +73,7 @@ struct Rules {
   planner::FirmwareConfig fixed;
   NozzleModel nozzle;
   std::vector<NozzleModel> plants;  // what else the axes may be
-  PrintOnBed print_on_bed;
+  MachineChange change;
   TravelLimits travel;
   double base_max_velocity_mm_s = 600.0;
   // Limits of the acceleration of a run's motors: a fixed one, and one as a multiple of the plan's

@@ -1,4 +1,4 @@
-// A bed that moves and carries the print: its frequency falls while the print grows.
+// Machines whose frequencies change while a print goes on.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -70,6 +70,20 @@ TEST(AMovingBed, IsTheSameForAnyNumberOfWorkers) {
 
 TEST(AMovingBed, OfAWholeTonStaysAsItIs) {
   EXPECT_EQ(made(with(kExact, {"dynamics.y.moving_mass_g=1e6"})).text, made(kExact).text);
+}
+
+// Most of the print lies at 0.2 mm, where the frequency has fallen by a tenth.
+TEST(AMapOfHeights, IsFollowedRunByRun) {
+  const std::string map = "dynamics.y.map=[{along = \"z\", at_mm = [0, 0.2], freq_hz = [38, 34]}]";
+  const Made constant = made(kExact);
+  const Made followed = made(with(kExact, {map}));
+  EXPECT_LE(rms_mm(followed.report), 1.3 * rms_mm(constant.report));
+  const JobFolder ignored(print(), with(kExact, {map}));
+  ignored.set_output(constant.text);
+  SilentProgress progress;
+  const Result<report::Report> measured = verify(ignored.job(), progress);
+  ASSERT_TRUE(measured) << to_string(measured.error());
+  EXPECT_LE(rms_mm(followed.report), 0.3 * rms_mm(*measured));
 }
 
 }  // namespace
