@@ -10,6 +10,7 @@
 #include <numbers>
 #include <utility>
 
+#include "conflict.hpp"
 #include "key_table.hpp"
 #include "toml_reader.hpp"
 #include "unflex/core/firmware_spec.hpp"
@@ -21,27 +22,8 @@
 namespace unflex::machine {
 namespace {
 
-// The first failure of check(v, …), which is asked for each axis in turn.
-template <typename Check, typename... Values>
-Status each_in_turn(Check&& check, Values&&... values) {
-  Status first;
-  for_each_axis(
-      [&](auto&&... value) {
-        if (first) {
-          first = check(value...);
-        }
-      },
-      values...);
-  return first;
-}
-
 // With fewer nodes per period of resonance, the optimum is worse than a ZV shaper's.
 constexpr double kLeastNodesPerPeriod = 10.0;
-
-std::optional<SourcePlace> place_of(const Draft& draft, std::string_view key) {
-  const std::optional<std::size_t> index = find_key(key);
-  return index ? draft.places[*index] : std::nullopt;
-}
 
 // Rounds a bound to three digits that a user may type, so that the result keeps the bound.
 double typed(double value, double (*round)(double)) {
@@ -50,19 +32,6 @@ double typed(double value, double (*round)(double)) {
 }
 std::string at_most(double value) { return readable(typed(value, std::floor)); }
 std::string at_least(double value) { return readable(typed(value, std::ceil)); }
-
-// An error at the first of the keys that was given anywhere. If all are defaults, it has no place.
-tl::unexpected<Error> conflict(const Draft& draft, std::initializer_list<std::string_view> keys,
-                               std::string message) {
-  SourcePlace first;
-  for (const std::string_view key : keys) {
-    if (const std::optional<SourcePlace> place = place_of(draft, key)) {
-      first = *place;
-      break;
-    }
-  }
-  return fail(ErrorKind::usage, std::move(first), std::move(message));
-}
 
 constexpr std::array<std::string_view, 2> kModalKeys = {"freq_hz", "damping_ratio"};
 constexpr std::array<std::string_view, 3> kMassKeys = {"mass_g", "stiffness_n_mm",
@@ -260,83 +229,6 @@ Status check_shaper(const Draft& draft) {
   return {};
 }
 
-// Checks that the firmware can plan for the kinematics.
-Status check_kinematics(const Draft& draft) {
-  const Settings& s = draft.settings;
-  const auto refuse = [&](std::string_view why) {
-    return conflict(draft, {"kinematics.type", "printer.firmware"},
-                    fmt::format("kinematics.type is \"{}\", which {}; print the sliced file as it "
-                                "is on this machine",
-                                to_string(s.kinematics.type), why));
-  };
-  switch (s.kinematics.type) {
-    case Kinematics::cartesian:
-    case Kinematics::corexy:
-    case Kinematics::corexz:
-      return {};
-    case Kinematics::hybrid_corexy:
-      return s.spec().printers.hybrid_corexy_refusal.empty()
-                 ? Status{}
-                 : refuse(s.spec().printers.hybrid_corexy_refusal);
-    case Kinematics::hybrid_corexy_inverted:
-    case Kinematics::hybrid_corexz:
-      if (!s.spec().printers.has_all_kinematics) {
-        return refuse("Klipper alone has");
-      }
-      return {};
-    case Kinematics::tripteron:
-    case Kinematics::linear:
-      return s.spec().printers.takes_a_matrix ? Status{}
-                                              : refuse("takes a matrix that this firmware lacks");
-  }
-  return {};
-}
-
-// Checks that a map of frequencies is for an axis with one frequency.
-Status check_maps(const Draft& draft) {
-  const auto check = [&](std::string_view axis, const AxisDynamics& dynamics) -> Status {
-    if (dynamics.map.empty() || dynamics.modes.empty()) {
-      return {};
-    }
-    const std::string map = fmt::format("dynamics.{}.map", axis);
-    const std::string mode = fmt::format("dynamics.{}.mode", axis);
-    return conflict(
-        draft, {map, mode},
-        fmt::format("{} tells one frequency at each height, and {} several; take one of "
-                    "them away",
-                    map, mode));
-  };
-  return each_in_turn(check, kAxisKeys, draft.settings.dynamics);
-}
-
-constexpr std::array<std::string_view, Motors::kCount> kJoints = {
-    "kinematics.joint_a", "kinematics.joint_b", "kinematics.joint_c"};
-
-// Checks the rows of a linear machine.
-Status check_joints(const Draft& draft) {
-  const KinematicsSettings& kinematics = draft.settings.kinematics;
-  const bool is_linear = kinematics.type == Kinematics::linear;
-  const bool takes_rows = is_linear || kinematics.type == Kinematics::tripteron;
-  for (std::size_t i = 0; i < kJoints.size(); ++i) {
-    if (kinematics.joints[i] && !takes_rows) {
-      return conflict(draft, {kJoints[i], "kinematics.type"},
-                      fmt::format("{} is given, but kinematics.type is \"{}\", whose motors are "
-                                  "known; take one of them away, or make the type \"linear\"",
-                                  kJoints[i], to_string(kinematics.type)));
-    }
-    if (is_linear && !kinematics.joints[i]) {
-      return conflict(draft, {"kinematics.type"},
-                      fmt::format("kinematics.type is \"linear\", so {} must be given: the travel "
-                                  "of a motor per mm of X, of Y and of Z",
-                                  kJoints[i]));
-    }
-  }
-  const std::optional<std::string> fault = Motors::fault(draft.settings.motors().rows());
-  return fault ? Status(conflict(draft, {kJoints[0], kJoints[1], kJoints[2], "kinematics.type"},
-                                 fmt::format("no machine can have these motors: {}", *fault)))
-               : Status{};
-}
-
 Status check_base(const Draft& draft) {
   const Settings& s = draft.settings;
   const double most = s.most_of_motor();
@@ -484,8 +376,8 @@ Status resolve_dynamics(Draft& draft) {
 }
 
 Status check_consistency(const Draft& draft) {
-  for (auto* check : {check_printer, check_shaper, check_kinematics, check_joints, check_maps,
-                      check_base, check_emission, check_second, check_timing, check_grid}) {
+  for (auto* check : {check_printer, check_shaper, check_machine, check_base, check_emission,
+                      check_second, check_timing, check_grid}) {
     if (Status checked = check(draft); !checked) {
       return checked;
     }
