@@ -107,18 +107,30 @@ std::string store(const Value& value, const Key& key, std::string& target) {
   return {};
 }
 
-std::string store(const Value& value, const Key& key, std::optional<Motors::Row>& target) {
+// The numbers of a list; nothing if it is no list or has anything else.
+std::optional<std::vector<double>> numbers_of(const Value& value) {
   const auto* list = std::get_if<std::vector<Value>>(&value.content);
-  Motors::Row row{};
-  bool is_row = list != nullptr && list->size() == row.size();
-  for (std::size_t i = 0; is_row && i < row.size(); ++i) {
-    const auto* number = std::get_if<double>(&(*list)[i].content);
-    is_row = number != nullptr && std::isfinite(*number);
-    row[i] = is_row ? *number : 0.0;
+  if (list == nullptr) {
+    return std::nullopt;
   }
-  if (!is_row) {
+  std::vector<double> numbers;
+  for (const Value& element : *list) {
+    const auto* number = std::get_if<double>(&element.content);
+    if (number == nullptr || !std::isfinite(*number)) {
+      return std::nullopt;
+    }
+    numbers.push_back(*number);
+  }
+  return numbers;
+}
+
+std::string store(const Value& value, const Key& key, std::optional<Motors::Row>& target) {
+  Motors::Row row{};
+  const auto numbers = numbers_of(value);
+  if (!numbers || numbers->size() != row.size()) {
     return fmt::format("{} must be three numbers, as in [1, -1, 0]", key.name);
   }
+  std::ranges::copy(*numbers, row.begin());
   target = row;
   return {};
 }
@@ -290,22 +302,13 @@ std::string store(const Value& value, const Key& key, std::vector<PlantSettings>
 // The numbers of a list of a map; empty if it is no such list.
 std::vector<double> points_of(const Table& table, std::string_view name) {
   const NamedValue* const given = find(table, name);
-  const auto* list =
-      given != nullptr ? std::get_if<std::vector<Value>>(&given->value.content) : nullptr;
-  std::vector<double> points;
-  for (std::size_t i = 0; list != nullptr && i < list->size(); ++i) {
-    const auto* number = std::get_if<double>(&(*list)[i].content);
-    if (number == nullptr || !std::isfinite(*number)) {
-      return {};
-    }
-    points.push_back(*number);
-  }
-  return points;
+  return given == nullptr ? std::vector<double>{}
+                          : numbers_of(given->value).value_or(std::vector<double>{});
 }
 
 std::string store(const Table& table, const std::string& whose, FrequencyMap& map) {
   constexpr std::size_t kMostPoints = 100;
-  constexpr Bounds kFrequencies{.min = 1.0, .max = 1000.0};
+  const Key& frequency = key_table()[*find_key("dynamics.x.freq_hz")];
   for (const NamedValue& given : table) {
     if (given.name != "along" && given.name != "at_mm" && given.name != "freq_hz") {
       return fmt::format("{}: unknown value '{}'; a map has along, at_mm and freq_hz", whose,
@@ -328,8 +331,9 @@ std::string store(const Table& table, const std::string& whose, FrequencyMap& ma
     return fmt::format("{}: at_mm must increase from point to point", whose);
   }
   for (const double hz : map.freq_hz) {
-    if (!kFrequencies.contains(hz)) {
-      return fmt::format("{}: freq_hz has {}, but must be 1 to 1000", whose, hz);
+    if (!frequency.bounds.contains(hz)) {
+      return fmt::format("{}: freq_hz has {}, but must be {} to {}", whose, hz,
+                         frequency.bounds.min, frequency.bounds.max);
     }
   }
   return {};

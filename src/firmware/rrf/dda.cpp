@@ -116,11 +116,10 @@ bool shares_motor(const Motors::Rows& rows, const Motors::Rows& inverse, std::si
 // CoreKinematics::LimitSpeedAndAcceleration. The firmware passes it the direction without signs.
 void limit_by_motors(const Settings& settings, Dda& dda) {
   const Motors::Rows& rows = settings.motors.rows();
-  const Motors::Rows inverse = settings.motors.inverse();
   for (std::size_t motor = 0; motor < rows.size(); ++motor) {
     float part = 0.0F;
     for (const auto axis : gcode::kXYZ) {
-      if (shares_motor(rows, inverse, axis)) {
+      if (settings.shares_motor[axis]) {
         part += static_cast<float>(rows[motor][axis]) * std::abs(dda.direction[axis]);
       }
     }
@@ -138,6 +137,10 @@ Settings make_settings(const Limits& asked, const FirmwareConfig& config) {
   const Limits limits = rrf_raised(asked);
   Settings result;
   result.motors = config.motors;
+  const Motors::Rows inverse = config.motors.inverse();
+  for (const auto axis : gcode::kXYZ) {
+    result.shares_motor[axis] = shares_motor(config.motors.rows(), inverse, axis);
+  }
   const auto clock = static_cast<float>(config.step_clock_hz);
   const float per_clock2 = 1.0F / static_cast<float>(config.step_clock_hz * config.step_clock_hz);
   result.clock_hz = clock;

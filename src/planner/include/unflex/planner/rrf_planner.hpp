@@ -38,7 +38,7 @@
 // move keeps its trapezoid.
 //
 // Left out: pressure advance (its default of 0 leaves acceleration alone; M572), input shaping, the
-// reduced accelerations of M201.1, kinematics other than Cartesian and cores, tools with several X
+// reduced accelerations of M201.1, kinematics that are not linear, tools with several X
 // or Y motors or extruders, M595 R (grace period), babystepping, movements of drives on CAN boards,
 // which may last one clock longer.
 #pragma once
@@ -60,6 +60,7 @@ using Vector = std::array<float, 4>;  // X Y Z E
 // Limits in the firmware's own units: mm and step clocks.
 struct Settings {
   Motors motors;
+  std::array<bool, Motors::kCount> shares_motor{};  // of each axis: HasSharedMotor
   float clock_hz = 0.0F;
   Vector max_speed{};     // M203
   Vector max_accel{};     // M201

@@ -15,8 +15,8 @@ namespace unflex::run {
 
 class Admission {
  public:
-  // rules: of every run. kept: runs that earlier passes blamed. Settings, kept and report must
-  // outlive the Admission.
+  // kept: runs that earlier passes blamed. The machine, kept and the report must outlive the
+  // Admission.
   Admission(MachineModel& machine, std::string input_name,
             const std::vector<verify::BlamedRun>& kept, report::Report& report);
 
