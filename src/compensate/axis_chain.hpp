@@ -38,8 +38,6 @@ struct AxisChain {
 
   // The chain of one mode whose gain is 1. omega_h: ωh.
   AxisChain(double omega_h, double zeta);
-  AxisChain(const dynamics::Mode& mode, double period_s)
-      : AxisChain(mode.omega_rad_s * period_s, mode.zeta) {}
 };
 
 // The quantities that limits bound. Each has one row per node; jerk has one per interval.

@@ -35,11 +35,20 @@ int AxisProblem::place(Component component, std::size_t mode) const {
   return component + (other_mode ? 2 + 2 * static_cast<int>(mode) : 0);
 }
 
-void AxisProblem::dynamics(double /*t*/, const PointVector& z, StateVector& f) const {
+AxisProblem::Mode AxisProblem::mode_at(std::size_t i, double t) const {
+  const Mode& mode = modes_[i];
+  if (window_->freq_shares.empty()) {
+    return mode;
+  }
+  const double share = window_->freq_shares[sample(t)];
+  return {share * mode.damping, math::square(share) * mode.stiffness};
+}
+
+void AxisProblem::dynamics(double t, const PointVector& z, StateVector& f) const {
   for (std::size_t i = 0; i < modes_.size(); ++i) {
     const int q = place(kNozzle, i);
     const int rate = place(kNozzleRate, i);
-    const Mode& mode = modes_[i];
+    const Mode mode = mode_at(i, t);
     f(q) = z(rate);
     f(rate) = mode.damping * (z(kBaseRate) - z(rate)) + mode.stiffness * (z(kBase) - z(q));
   }
@@ -47,13 +56,12 @@ void AxisProblem::dynamics(double /*t*/, const PointVector& z, StateVector& f) c
   f(kBaseRate) = z(place(kBaseAccel));
 }
 
-void AxisProblem::dynamics_jacobian(double /*t*/, const PointVector& /*z*/,
-                                    StateByPoint& fz) const {
+void AxisProblem::dynamics_jacobian(double t, const PointVector& /*z*/, StateByPoint& fz) const {
   fz.setZero();
   for (std::size_t i = 0; i < modes_.size(); ++i) {
     const int q = place(kNozzle, i);
     const int rate = place(kNozzleRate, i);
-    const Mode& mode = modes_[i];
+    const Mode mode = mode_at(i, t);
     fz(q, rate) = 1.0;
     fz(rate, q) = -mode.stiffness;
     fz(rate, rate) = -mode.damping;

@@ -71,6 +71,9 @@ class AxisProblem final : public collocation::OptimalControlProblem {
     double damping;    // 2ζωh
     double stiffness;  // (ωh)²
   };
+  // Mode i at time t, which is a node or a middle.
+  [[nodiscard]] Mode mode_at(std::size_t i, double t) const;
+
   std::vector<Mode> modes_;  // of all models
   std::vector<SharedModes::Model> models_;
   // Sets the places of the nozzle in z, of all models.

@@ -126,7 +126,7 @@ const Stencil& FlatStencils::of(RowKind kind) const {
 }
 
 bool FlatForm::takes(const AxisWindow& window) {
-  return window.models() == 1 && window.axis.mode_count() == 1;
+  return window.models() == 1 && window.axis.mode_count() == 1 && window.freq_shares.empty();
 }
 
 bool FlatForm::suits(const ScaledWindow& scaled) {

@@ -87,6 +87,30 @@ AxisWindow make_axis(const AxisSetup& axis, const Setup& setup, double period_s,
   return window;
 }
 
+// Takes the frequencies over the bed into an axis' window. places_mm: r of all axes at its samples.
+// Where the frequencies hardly change, their mean serves the whole window.
+void take_field(const dynamics::FrequencyField& field, const Axes<std::vector<double>>& places_mm,
+                AxisWindow& window) {
+  constexpr double kHardly = 2e-3;
+  if (field.is_even()) {
+    return;
+  }
+  std::vector<double> shares;
+  for (std::size_t i = 0; i < places_mm.x.size(); ++i) {
+    shares.push_back(field.at({places_mm.x[i], places_mm.y[i]}));
+  }
+  const auto [low, high] = std::ranges::minmax(shares);
+  if (high > (1.0 + kHardly) * low) {
+    window.freq_shares = std::move(shares);
+    return;
+  }
+  const double mean = 0.5 * (low + high);
+  window.axis = window.axis.detuned(mean);
+  for (Plant& plant : window.plants) {
+    plant.axis = plant.axis.detuned(mean);
+  }
+}
+
 // Raises the weights around the end of a run. first_sample: where they begin.
 void weigh_end(const Course& course, const Setup& setup, const NodeGrid& grid,
                std::size_t first_sample, std::vector<double>& weight) {
@@ -282,12 +306,15 @@ std::vector<RunWindow> windows(const Course& course, const std::vector<WindowSpa
           all.begin() + static_cast<std::ptrdiff_t>(2 * span.first - first_sample),
           all.begin() + static_cast<std::ptrdiff_t>(2 * span.last + 1 - first_sample));
     };
+    const Axes<std::vector<double>> places_mm = map_axes(slice, reference_mm);
     RunWindow window{map_axes(
                          [&](const AxisSetup& axis, const std::vector<double>& of_axis_mm) {
-                           return make_axis(axis, setup, grid.period_s, slice(of_axis_mm),
-                                            slice(weight));
+                           AxisWindow made =
+                               make_axis(axis, setup, grid.period_s, of_axis_mm, slice(weight));
+                           take_field(axis.field, places_mm, made);
+                           return made;
                          },
-                         setup, reference_mm),
+                         setup, places_mm),
                      setup.shares_motors,
                      setup.contour,
                      {}};

@@ -99,6 +99,7 @@ bool LaneStages<Lanes, V, W>::carry_cost_back(std::size_t k, const PerKind<const
                                               StageArrays& at) {
   const std::size_t g = groups();
   const std::size_t places = kLanes * g;
+  const NodeStep& s = step_at(k);
   const double* const jerk_weight = weights[index_of(RowKind::jerk)];
   const double middle = at.middle_weight[k];
   const double node = at.node_weight[k];
@@ -116,8 +117,8 @@ bool LaneStages<Lanes, V, W>::carry_cost_back(std::size_t k, const PerKind<const
     for (std::size_t v = 0; v < 2 * g; ++v) {
       const Lanes of_place = load<Lanes>(to_go(i, v));
       const Lanes of_rate = load<Lanes>(to_go(places + i, v));
-      u[v] = u[v] + (by_accel_[i] * of_place + by_accel_[places + i] * of_rate);
-      in[v] = in[v] + (by_jerk_[i] * of_place + by_jerk_[places + i] * of_rate);
+      u[v] = u[v] + (s.by_accel[i] * of_place + s.by_accel[places + i] * of_rate);
+      in[v] = in[v] + (s.by_jerk[i] * of_place + s.by_jerk[places + i] * of_rate);
     }
   }
   double u_base[3];
@@ -128,8 +129,8 @@ bool LaneStages<Lanes, V, W>::carry_cost_back(std::size_t k, const PerKind<const
     for (std::size_t v = 0; v < g; ++v) {
       const Lanes place = load<Lanes>(base_to_go(i, v));
       const Lanes rate = load<Lanes>(base_to_go(i, g + v));
-      of_accel = of_accel + (accel(0, v) * place + accel(1, v) * rate);
-      of_input = of_input + (jerk(0, v) * place + jerk(1, v) * rate);
+      of_accel = of_accel + (accel(s, 0, v) * place + accel(s, 1, v) * rate);
+      of_input = of_input + (jerk(s, 0, v) * place + jerk(s, 1, v) * rate);
     }
     u_base[i] = sum(of_accel) + (0.5 * pbb[i][0] + pbb[i][1] + pbb[i][2]);
     in_base[i] =
@@ -140,25 +141,25 @@ bool LaneStages<Lanes, V, W>::carry_cost_back(std::size_t k, const PerKind<const
   Lanes accel_square = broadcast<Lanes>(0.0);
   LaneRow<Lanes, 2 * V> c(2 * g);
   for (std::size_t v = 0; v < g; ++v) {
-    of_input = of_input + (jerk(0, v) * in[v] + jerk(1, v) * in[g + v]);
-    of_accel = of_accel + (accel(0, v) * in[v] + accel(1, v) * in[g + v]);
-    accel_square = accel_square + (accel(0, v) * u[v] + accel(1, v) * u[g + v]);
-    c[v] = own(0, v) * in[v] + own(2, v) * in[g + v] +
-           middle * load<Lanes>(middle_.cross.at(kLanes * v));
-    c[g + v] = own(1, v) * in[v] + own(3, v) * in[g + v] +
-               middle * load<Lanes>(middle_.cross.at(kLanes * (g + v)));
+    of_input = of_input + (jerk(s, 0, v) * in[v] + jerk(s, 1, v) * in[g + v]);
+    of_accel = of_accel + (accel(s, 0, v) * in[v] + accel(s, 1, v) * in[g + v]);
+    accel_square = accel_square + (accel(s, 0, v) * u[v] + accel(s, 1, v) * u[g + v]);
+    c[v] = own(s, 0, v) * in[v] + own(s, 2, v) * in[g + v] +
+           middle * load<Lanes>(s.middle.cross.at(kLanes * v));
+    c[g + v] = own(s, 1, v) * in[v] + own(s, 3, v) * in[g + v] +
+               middle * load<Lanes>(s.middle.cross.at(kLanes * (g + v)));
   }
   const double curvature =
       jerk_weight_ + (jerk_weight != nullptr ? jerk_weight[k] : 0.0) + sum(of_input) +
       (kBaseByJerk[0] * in_base[0] + kBaseByJerk[1] * in_base[1] + in_base[2]) +
-      middle * middle_.curvature;
+      middle * s.middle.curvature;
   if (!(curvature > 0.0)) {
     return false;
   }
   double cb[3] = {
-      in_base[0] + middle * middle_.base_cross[0],
-      in_base[0] + in_base[1] + middle * middle_.base_cross[1],
-      0.5 * in_base[0] + in_base[1] + in_base[2] + sum(of_accel) + middle * middle_.base_cross[2]};
+      in_base[0] + middle * s.middle.base_cross[0],
+      in_base[0] + in_base[1] + middle * s.middle.base_cross[1],
+      0.5 * in_base[0] + in_base[1] + in_base[2] + sum(of_accel) + middle * s.middle.base_cross[2]};
   // Computes the feedback. A prescribed feedback has entries for the base alone, so it adds nothing
   // to P_ss.
   double* const f = at.feedback.data() + k * state_size();
@@ -184,8 +185,8 @@ bool LaneStages<Lanes, V, W>::carry_cost_back(std::size_t k, const PerKind<const
   for (std::size_t i = 0; i < 3; ++i) {
     f[base_place() + i] = fb[i];
   }
-  carry_swing_back(f, c, middle, node);
-  carry_cross_back(u, c, fb, middle, node);
+  carry_swing_back(s, f, c, middle, node);
+  carry_cross_back(s, u, c, fb, middle, node);
   double next[3][3];
   next[0][0] = pbb[0][0];
   next[0][1] = pbb[0][0] + pbb[0][1];
@@ -195,7 +196,7 @@ bool LaneStages<Lanes, V, W>::carry_cost_back(std::size_t k, const PerKind<const
   next[2][2] = 0.5 * u_base[0] + u_base[1] + u_base[2] + sum(accel_square);
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t j = i; j < 3; ++j) {
-      next[i][j] += middle * middle_.base_square[i][j] +
+      next[i][j] += middle * s.middle.base_square[i][j] +
                     (prescribed ? cb[i] * fb[j] + fb[i] * cb[j] : fb[i] * cb[j]);
       pbb[i][j] = pbb[j][i] = next[i][j];
     }
@@ -208,15 +209,16 @@ bool LaneStages<Lanes, V, W>::carry_cost_back(std::size_t k, const PerKind<const
 // P_ss ← Φᵀ P_ss Φ + … + f cᵀ. Four rows of places and of rates at a time, from their own columns
 // on; what lies before these is their mirror image.
 template <class Lanes, std::size_t V, std::size_t W>
-void LaneStages<Lanes, V, W>::carry_swing_back(const double* f, const LaneRow<Lanes, 2 * V>& c,
-                                               double middle, double node) {
+void LaneStages<Lanes, V, W>::carry_swing_back(const NodeStep& s, const double* f,
+                                               const LaneRow<Lanes, 2 * V>& c, double middle,
+                                               double node) {
   const std::size_t g = groups();
   for (std::size_t a = 0; a < g; ++a) {
     for (std::size_t v = a; v < g; ++v) {
       if (in_one_model_[a * g + v] != 0) {
-        carry_block_back<true>(a, v, f, c, middle, node);
+        carry_block_back<true>(s, a, v, f, c, middle, node);
       } else {
-        carry_block_back<false>(a, v, f, c, middle, node);
+        carry_block_back<false>(s, a, v, f, c, middle, node);
       }
     }
   }
@@ -226,16 +228,16 @@ void LaneStages<Lanes, V, W>::carry_swing_back(const double* f, const LaneRow<La
 // both, so that the stage's own cost has products of them.
 template <class Lanes, std::size_t V, std::size_t W>
 template <bool kCosts>
-void LaneStages<Lanes, V, W>::carry_block_back(std::size_t a, std::size_t v, const double* f,
-                                               const LaneRow<Lanes, 2 * V>& c, double middle,
-                                               double node) {
+void LaneStages<Lanes, V, W>::carry_block_back(const NodeStep& s, std::size_t a, std::size_t v,
+                                               const double* f, const LaneRow<Lanes, 2 * V>& c,
+                                               double middle, double node) {
   const std::size_t g = groups();
   const std::size_t places = kLanes * g;
   const std::size_t swing = 2 * places;
-  const Lanes o0 = own(0, v);
-  const Lanes o1 = own(1, v);
-  const Lanes o2 = own(2, v);
-  const Lanes o3 = own(3, v);
+  const Lanes o0 = own(s, 0, v);
+  const Lanes o1 = own(s, 1, v);
+  const Lanes o2 = own(s, 2, v);
+  const Lanes o3 = own(s, 3, v);
   Lanes block[4][kLanes];  // from places and rates to places and rates
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     const std::size_t i = kLanes * a + lane;
@@ -248,17 +250,17 @@ void LaneStages<Lanes, V, W>::carry_block_back(std::size_t a, std::size_t v, con
     const Lanes place_r = o1 * pp + o3 * pr;
     const Lanes rate_p = o0 * rp + o2 * rr;
     const Lanes rate_r = o1 * rp + o3 * rr;
-    const double own_0 = own_[i];
-    const double own_1 = own_[places + i];
-    const double own_2 = own_[2 * places + i];
-    const double own_3 = own_[3 * places + i];
+    const double own_0 = s.own[i];
+    const double own_1 = s.own[places + i];
+    const double own_2 = s.own[2 * places + i];
+    const double own_3 = s.own[3 * places + i];
     block[0][lane] = own_0 * place_p + own_2 * rate_p + f[i] * c[v];
     block[1][lane] = own_0 * place_r + own_2 * rate_r + f[i] * c[g + v];
     block[2][lane] = own_1 * place_p + own_3 * rate_p + f[r] * c[v];
     block[3][lane] = own_1 * place_r + own_3 * rate_r + f[r] * c[g + v];
     if constexpr (kCosts) {
       const auto square = [&](std::size_t row, std::size_t group) {
-        return middle * load<Lanes>(middle_.square.at(row * swing + kLanes * group));
+        return middle * load<Lanes>(s.middle.square.at(row * swing + kLanes * group));
       };
       block[0][lane] =
           block[0][lane] +
@@ -288,7 +290,7 @@ void LaneStages<Lanes, V, W>::carry_block_back(std::size_t a, std::size_t v, con
 
 // Carries P_bs back over an interval.
 template <class Lanes, std::size_t V, std::size_t W>
-void LaneStages<Lanes, V, W>::carry_cross_back(const LaneRow<Lanes, 2 * V>& u,
+void LaneStages<Lanes, V, W>::carry_cross_back(const NodeStep& s, const LaneRow<Lanes, 2 * V>& u,
                                                const LaneRow<Lanes, 2 * V>& c, const double* fb,
                                                double middle, double node) {
   const std::size_t g = groups();
@@ -300,14 +302,14 @@ void LaneStages<Lanes, V, W>::carry_cross_back(const LaneRow<Lanes, 2 * V>& u,
     const Lanes rate_1 = rate_0 + load<Lanes>(base_to_go(1, g + v));
     const auto carry = [&](std::size_t i, const Lanes& place, const Lanes& rate) {
       Lanes next_place =
-          own(0, v) * place + own(2, v) * rate +
-          (middle * load<Lanes>(middle_.by_base.at(i * swing + kLanes * v)) + fb[i] * c[v]);
+          own(s, 0, v) * place + own(s, 2, v) * rate +
+          (middle * load<Lanes>(s.middle.by_base.at(i * swing + kLanes * v)) + fb[i] * c[v]);
       if (i == 0) {
         next_place = next_place + node * load<Lanes>(node_cross_.at(kLanes * v));
       }
       store(next_place, base_to_go(i, v));
-      store(own(1, v) * place + own(3, v) * rate +
-                (middle * load<Lanes>(middle_.by_base.at(i * swing + kLanes * (g + v))) +
+      store(own(s, 1, v) * place + own(s, 3, v) * rate +
+                (middle * load<Lanes>(s.middle.by_base.at(i * swing + kLanes * (g + v))) +
                  fb[i] * c[g + v]),
             base_to_go(i, g + v));
     };

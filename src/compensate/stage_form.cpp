@@ -3,7 +3,11 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstdint>
 #include <utility>
+
+#include "unflex/core/math.hpp"
 
 namespace unflex::compensate {
 std::size_t StageForm::place(std::size_t component) const {
@@ -21,13 +25,39 @@ void StageForm::set_model(const AxisWindow& window) {
     kernel_ = make_stage_kernel(shared.modes.size(), shared.models.size());
   }
   shared_ = std::move(shared);
-  model_.clear();
   model_.jerk_weight = window_->jerk_weight;
-  for (const SharedModes::Swing& swing : shared_.modes) {
-    model_.modes.add(swing.mode, window.period_s);
-  }
   model_.models = shared_.models;
+  set_steps(window);
   kernel_->assign(model_);
+}
+
+// Frequencies that differ by less than kSame share a step. An interval has the frequencies of its
+// middle.
+void StageForm::set_steps(const AxisWindow& window) {
+  constexpr double kSame = 2e-4;
+  std::vector<int> by_interval;
+  if (!window.freq_shares.empty()) {
+    for (std::size_t k = 0; k + 1 < window.nodes(); ++k) {
+      by_interval.push_back(
+          static_cast<int>(std::lround(math::log(window.freq_shares[2 * k + 1]) / kSame)));
+    }
+  }
+  std::vector<int> different = by_interval.empty() ? std::vector{0} : by_interval;
+  std::ranges::sort(different);
+  different.erase(std::ranges::unique(different).begin(), different.end());
+  model_.step_of.clear();
+  for (const int of_interval : by_interval) {
+    const auto place = std::ranges::lower_bound(different, of_interval);
+    model_.step_of.push_back(static_cast<std::uint32_t>(place - different.begin()));
+  }
+  model_.steps.resize(different.size());
+  for (std::size_t i = 0; i < different.size(); ++i) {
+    const double share = different[i] == 0 ? 1.0 : math::exp(kSame * different[i]);
+    model_.steps[i].clear();
+    for (const SharedModes::Swing& swing : shared_.modes) {
+      model_.steps[i].add(share * swing.mode.omega_rad_s * window.period_s, swing.mode.zeta);
+    }
+  }
 }
 
 void StageForm::assign(const ScaledWindow& scaled) {

@@ -1,6 +1,7 @@
 // The window stage by stage: states z_k and inputs j_k, stepped by a Riccati recursion. It is
 // several times the work of the flat form (flat_form.hpp), but takes any window: of two nodes, of
-// any ωh, axes of several modes, and any number of models of the axis (AxisWindow::plants).
+// any ωh, axes of several modes, any number of models of the axis (AxisWindow::plants), and
+// frequencies that change within the window (AxisWindow::freq_shares).
 //
 // Notation, beside that of axis_chain.hpp:
 //   c           models
@@ -92,7 +93,7 @@ class StageForm {
   static constexpr std::array<RowKind, 3> kNodeKinds = {RowKind::position, RowKind::velocity,
                                                         RowKind::accel};
 
-  [[nodiscard]] std::size_t count() const { return model_.modes.count(); }
+  [[nodiscard]] std::size_t count() const { return model_.steps.front().count(); }
   // n: the components of z that are not left empty.
   [[nodiscard]] std::size_t components() const { return 2 * count() + 3; }
   // Where a component lies in a state of the kernel.
@@ -102,6 +103,7 @@ class StageForm {
   }
 
   void set_model(const AxisWindow& window);
+  void set_steps(const AxisWindow& window);
   void set_start();
   void set_aims();
   [[nodiscard]] bool factor_start();

@@ -15,8 +15,8 @@ void ModeSteps::clear() {
   }
 }
 
-void ModeSteps::add(const dynamics::Mode& mode, double period_s) {
-  const AxisChain chain(mode, period_s);
+void ModeSteps::add(double omega_h, double zeta) {
+  const AxisChain chain(omega_h, zeta);
   const ChainMatrix& growth = chain.growth;
   own[0].push_back(1.0 + growth(0, 0));
   own[1].push_back(growth(0, 1));
@@ -26,11 +26,6 @@ void ModeSteps::add(const dynamics::Mode& mode, double period_s) {
   by_accel[1].push_back(growth(1, 4) - growth(3, 4));
   by_jerk[0].push_back(chain.input(0) - chain.input(2));
   by_jerk[1].push_back(chain.input(1) - chain.input(3));
-}
-
-void StageModel::clear() {
-  modes.clear();
-  models.clear();
 }
 
 void StageArrays::resize(std::size_t node_count, std::size_t state_size, std::size_t model_places) {

@@ -9,6 +9,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <vector>
 
@@ -26,18 +27,18 @@ struct ModeSteps {
   std::array<std::vector<double>, 2> by_jerk;
 
   void clear();
-  // A mode whose gain counts as 1. period_s: h.
-  void add(const dynamics::Mode& mode, double period_s);
+  // A mode whose gain counts as 1. omega_h: ωh.
+  void add(double omega_h, double zeta);
   [[nodiscard]] std::size_t count() const { return own[0].size(); }
 };
 
 // Data that all stages of a window share.
 struct StageModel {
-  ModeSteps modes;
+  // The modes' steps, one for each set of frequencies that they have in the window.
+  std::vector<ModeSteps> steps;
+  std::vector<std::uint32_t> step_of;  // by intervals, into `steps`; empty: the first for all
   std::vector<SharedModes::Model> models;
   double jerk_weight = 0.0;  // ρ
-
-  void clear();
 };
 
 // Coefficients of j in the next b, ḃ and b̈: b' = b + ḃ + b̈/2 + j/6 and so on.

@@ -11,6 +11,7 @@
 //   c         Φᵀ P B + …, as in stage_form.hpp
 //   f         feedback −c/R
 //   m, μ      coefficients of z and of the input in the place p in the middle of an interval
+//   s         an interval's Φ, B, m and μ, by the frequencies that the modes have there
 
 namespace unflex::compensate {
 
@@ -76,40 +77,23 @@ class LaneStages final : public StageKernel {
     const std::size_t k = kLanes * groups();
     const std::size_t m = kLanes * model_groups();
     jerk_weight_ = model.jerk_weight;
-    own_.assign_zeros(4 * k);
-    by_accel_.assign_zeros(2 * k);
-    by_jerk_.assign_zeros(2 * k);
-    for (std::size_t i = 0; i < model.modes.count(); ++i) {
-      for (std::size_t part = 0; part < 4; ++part) {
-        own_[part * k + i] = model.modes.own[part][i];
-      }
-      for (std::size_t part = 0; part < 2; ++part) {
-        by_accel_[part * k + i] = model.modes.by_accel[part][i];
-        by_jerk_[part * k + i] = model.modes.by_jerk[part][i];
-      }
-    }
     share_.assign_zeros(m);
     is_model_.assign_zeros(m);
     by_model_.assign_zeros(m * k);
     by_mode_.assign_zeros(k * m);
-    middle_.by_model.assign_zeros(m * 2 * k);
-    middle_.by_place.assign_zeros(2 * k * m);
-    middle_.base.assign_zeros(3 * m);
-    middle_.input.assign_zeros(m);
     node_square_.assign_zeros(k * k);
     node_cross_.assign_zeros(k);
-    middle_.square.assign_zeros(4 * k * k);
     in_one_model_.assign(groups() * groups(), 0);
-    middle_.by_base.assign_zeros(3 * 2 * k);
-    middle_.cross.assign_zeros(2 * k);
     cost_to_go_.assign_zeros(4 * k * k);
     base_to_go_.assign_zeros(3 * 2 * k);
     node_base_ = 0.0;
-    middle_.base_square = {};
-    middle_.base_cross = {};
-    middle_.curvature = 0.0;
     for (std::size_t c = 0; c < model.models.size(); ++c) {
       add_model(c, model.models[c].parts, model.models[c].share);
+    }
+    step_of_ = model.step_of;
+    steps_.resize(model.steps.size());
+    for (std::size_t i = 0; i < steps_.size(); ++i) {
+      set_step(model.steps[i], model.models, steps_[i]);
     }
   }
 
@@ -162,15 +146,50 @@ class LaneStages final : public StageKernel {
     }
   }
 
+  template <std::size_t N>
+  using Numbers = KernelNumbers<Lanes, N>;
+  static constexpr std::size_t kK = kLanes * V;
+  static constexpr std::size_t kM = kLanes * W;
+
+  // p in the middle of an interval.
+  struct Middle {
+    // m of the swing, by models and by places; m of the base; and μ.
+    Numbers<2 * kM * kK> by_model;
+    Numbers<2 * kM * kK> by_place;
+    Numbers<3 * kM> base;
+    Numbers<kM> input;
+    // Σ α of the squares of p.
+    Numbers<4 * kK * kK> square;
+    Numbers<6 * kK> by_base;
+    std::array<std::array<double, 3>, 3> base_square{};
+    // Σ α μ m and Σ α μ².
+    Numbers<2 * kK> cross;
+    std::array<double, 3> base_cross{};
+    double curvature = 0.0;
+  };
+
+  // s: what depends on the modes' frequencies.
+  struct NodeStep {
+    Numbers<4 * kK> own;       // A, by parts
+    Numbers<2 * kK> by_accel;  // a
+    Numbers<2 * kK> by_jerk;   // β
+    Middle middle;
+  };
+
+  // The step from node k to the next.
+  [[nodiscard]] const NodeStep& step_at(std::size_t k) const {
+    return steps_[step_of_.empty() ? 0 : step_of_[k]];
+  }
+
   // Four modes' part of A, a and β.
-  [[nodiscard]] Lanes own(std::size_t part, std::size_t v) const {
-    return load<Lanes>(own_.at(kLanes * (part * groups() + v)));
+  [[nodiscard]] Lanes own(const NodeStep& s, std::size_t part, std::size_t v) const {
+    return load<Lanes>(s.own.at(kLanes * (part * groups() + v)));
   }
-  [[nodiscard]] Lanes accel(std::size_t part, std::size_t v) const {
-    return load<Lanes>(by_accel_.at(kLanes * (part * groups() + v)));
+  [[nodiscard]] Lanes accel(const NodeStep& s, std::size_t part, std::size_t v) const {
+    return load<Lanes>(s.by_accel.at(kLanes * (part * groups() + v)));
   }
-  [[nodiscard]] Lanes jerk(std::size_t part, std::size_t v) const {
-    return load<Lanes>(by_jerk_.at(kLanes * (part * groups() + v)));
+  [[nodiscard]] Lanes jerk(const NodeStep& s, std::size_t part, std::size_t v) const {
+    return load<Lanes>(s.by_jerk.at(kLanes * (part * groups() + v)));
   }
   [[nodiscard]] double* to_go(std::size_t row, std::size_t v) {
     return cost_to_go_.at(row * base_place() + kLanes * v);
@@ -193,7 +212,64 @@ class LaneStages final : public StageKernel {
             -(0.5 + 2.0 / 3.0 + 1.0 / 6.0) / kRestingByJerk};
   }
 
+  // What a model is at the nodes.
   void add_model(std::size_t c, const std::vector<SharedModes::Part>& parts, double share) {
+    const std::size_t k = mode_places();
+    const std::size_t models = model_places();
+    std::vector<double> place(k);
+    for (const auto& [i, gain] : parts) {
+      for (const auto& [other, other_gain] : parts) {
+        in_one_model_[i / kLanes * groups() + other / kLanes] = 1;
+      }
+      place[i] += gain;
+      by_model_[c * k + i] += gain;
+      by_mode_[i * models + c] += gain;
+    }
+    share_[c] = share;
+    is_model_[c] = 1.0;
+    for (std::size_t i = 0; i < k; ++i) {
+      node_cross_[i] += share * place[i];
+      for (std::size_t j = 0; j < k; ++j) {
+        node_square_[i * k + j] += share * place[i] * place[j];
+      }
+    }
+    node_base_ += share;
+  }
+
+  void set_step(const ModeSteps& modes, const std::vector<SharedModes::Model>& models,
+                NodeStep& s) const {
+    const std::size_t k = mode_places();
+    const std::size_t m = model_places();
+    s.own.assign_zeros(4 * k);
+    s.by_accel.assign_zeros(2 * k);
+    s.by_jerk.assign_zeros(2 * k);
+    for (std::size_t i = 0; i < modes.count(); ++i) {
+      for (std::size_t part = 0; part < 4; ++part) {
+        s.own[part * k + i] = modes.own[part][i];
+      }
+      for (std::size_t part = 0; part < 2; ++part) {
+        s.by_accel[part * k + i] = modes.by_accel[part][i];
+        s.by_jerk[part * k + i] = modes.by_jerk[part][i];
+      }
+    }
+    s.middle.by_model.assign_zeros(m * 2 * k);
+    s.middle.by_place.assign_zeros(2 * k * m);
+    s.middle.base.assign_zeros(3 * m);
+    s.middle.input.assign_zeros(m);
+    s.middle.square.assign_zeros(4 * k * k);
+    s.middle.by_base.assign_zeros(3 * 2 * k);
+    s.middle.cross.assign_zeros(2 * k);
+    s.middle.base_square = {};
+    s.middle.base_cross = {};
+    s.middle.curvature = 0.0;
+    for (std::size_t c = 0; c < models.size(); ++c) {
+      add_middle(c, models[c].parts, models[c].share, s);
+    }
+  }
+
+  // What a model is in the middle of an interval.
+  void add_middle(std::size_t c, const std::vector<SharedModes::Part>& parts, double share,
+                  NodeStep& s) const {
     const std::size_t k = mode_places();
     const std::size_t models = model_places();
     const std::size_t swing = 2 * k;
@@ -202,95 +278,83 @@ class LaneStages final : public StageKernel {
     place[swing] = 1.0;
     rate[swing + 1] = 1.0;
     for (const auto& [i, gain] : parts) {
-      for (const auto& [other, other_gain] : parts) {
-        in_one_model_[i / kLanes * groups() + other / kLanes] = 1;
-      }
       place[i] += gain;
       rate[k + i] += gain;
-      by_model_[c * k + i] += gain;
-      by_mode_[i * models + c] += gain;
     }
     // p = (p₁ + p₂)/2 + (ṗ₁ − ṗ₂)/8.
     std::vector<double> middle(swing + 3);
     for (std::size_t i = 0; i < middle.size(); ++i) {
       middle[i] = 0.5 * place[i] - 0.125 * rate[i];
     }
-    const double input = by_input(middle.data());
-    transpose_step(middle.data());
+    const double input = by_input(s, middle.data());
+    transpose_step(s, middle.data());
     for (std::size_t i = 0; i < middle.size(); ++i) {
       middle[i] += 0.5 * place[i] + 0.125 * rate[i];
     }
-    share_[c] = share;
-    is_model_[c] = 1.0;
-    middle_.input[c] = input;
+    s.middle.input[c] = input;
     for (std::size_t i = 0; i < swing; ++i) {
-      middle_.by_model[c * swing + i] = middle[i];
-      middle_.by_place[i * models + c] = middle[i];
-      middle_.cross[i] += share * input * middle[i];
+      s.middle.by_model[c * swing + i] = middle[i];
+      s.middle.by_place[i * models + c] = middle[i];
+      s.middle.cross[i] += share * input * middle[i];
       for (std::size_t j = 0; j < swing; ++j) {
-        middle_.square[i * swing + j] += share * middle[i] * middle[j];
+        s.middle.square[i * swing + j] += share * middle[i] * middle[j];
       }
     }
-    for (std::size_t i = 0; i < k; ++i) {
-      node_cross_[i] += share * place[i];
-      for (std::size_t j = 0; j < k; ++j) {
-        node_square_[i * k + j] += share * place[i] * place[j];
-      }
-    }
-    node_base_ += share;
     for (std::size_t i = 0; i < 3; ++i) {
       const double of_base = middle[swing + i];
-      middle_.base[i * models + c] = of_base;
-      middle_.base_cross[i] += share * input * of_base;
+      s.middle.base[i * models + c] = of_base;
+      s.middle.base_cross[i] += share * input * of_base;
       for (std::size_t j = 0; j < swing; ++j) {
-        middle_.by_base[i * swing + j] += share * of_base * middle[j];
+        s.middle.by_base[i * swing + j] += share * of_base * middle[j];
       }
       for (std::size_t j = 0; j < 3; ++j) {
-        middle_.base_square[i][j] += share * of_base * middle[swing + j];
+        s.middle.base_square[i][j] += share * of_base * middle[swing + j];
       }
     }
-    middle_.curvature += share * input * input;
+    s.middle.curvature += share * input * input;
   }
 
   // Bᵀ v
-  [[nodiscard]] double by_input(const double* v) const {
+  [[nodiscard]] double by_input(const NodeStep& s, const double* v) const {
     const std::size_t k = mode_places();
     const double* const b = v + 2 * k;
     double result = kBaseByJerk[0] * b[0] + kBaseByJerk[1] * b[1] + kBaseByJerk[2] * b[2];
     for (std::size_t i = 0; i < k; ++i) {
-      result += by_jerk_[i] * v[i] + by_jerk_[k + i] * v[k + i];
+      result += s.by_jerk[i] * v[i] + s.by_jerk[k + i] * v[k + i];
     }
     return result;
   }
 
   // v ← Φᵀ v
-  void transpose_step(double* v) const {
+  void transpose_step(const NodeStep& s, double* v) const {
     const std::size_t k = mode_places();
     double* const b = v + 2 * k;
     double of_accel = 0.5 * b[0] + b[1] + b[2];
     for (std::size_t i = 0; i < k; ++i) {
       const double y = v[i];
       const double rate = v[k + i];
-      of_accel += by_accel_[i] * y + by_accel_[k + i] * rate;
-      v[i] = own_[i] * y + own_[2 * k + i] * rate;
-      v[k + i] = own_[k + i] * y + own_[3 * k + i] * rate;
+      of_accel += s.by_accel[i] * y + s.by_accel[k + i] * rate;
+      v[i] = s.own[i] * y + s.own[2 * k + i] * rate;
+      v[k + i] = s.own[k + i] * y + s.own[3 * k + i] * rate;
     }
     b[1] += b[0];
     b[2] = of_accel;
   }
 
   // z_{k+1} from z_k and j_k.
-  void step(const double* z, double input, double* next) const {
+  void step(const NodeStep& s, const double* z, double input, double* next) const {
     const std::size_t g = groups();
     const double* const b = z + base_place();
     double* const to = next + base_place();
     for (std::size_t v = 0; v < g; ++v) {
       const Lanes y = load<Lanes>(z + kLanes * v);
       const Lanes rate = load<Lanes>(z + kLanes * (g + v));
-      store(own(0, v) * y + own(1, v) * rate + (b[2] * accel(0, v) + input * jerk(0, v)),
-            next + kLanes * v);
-      store(own(2, v) * y + own(3, v) * rate + (b[2] * accel(1, v) + input * jerk(1, v)),
-            next + kLanes * (g + v));
+      store(
+          own(s, 0, v) * y + own(s, 1, v) * rate + (b[2] * accel(s, 0, v) + input * jerk(s, 0, v)),
+          next + kLanes * v);
+      store(
+          own(s, 2, v) * y + own(s, 3, v) * rate + (b[2] * accel(s, 1, v) + input * jerk(s, 1, v)),
+          next + kLanes * (g + v));
     }
     to[0] = b[0] + b[1] + 0.5 * b[2] + kBaseByJerk[0] * input;
     to[1] = b[1] + b[2] + kBaseByJerk[1] * input;
@@ -323,13 +387,14 @@ class LaneStages final : public StageKernel {
   void keep(std::size_t k);
   void take_kept(std::size_t k);
   bool carry_cost_back(std::size_t k, const PerKind<const double*>& weights, StageArrays& at);
-  void carry_swing_back(const double* f, const LaneRow<Lanes, 2 * V>& c, double middle,
-                        double node);
+  void carry_swing_back(const NodeStep& s, const double* f, const LaneRow<Lanes, 2 * V>& c,
+                        double middle, double node);
   template <bool kCosts>
-  void carry_block_back(std::size_t a, std::size_t v, const double* f,
+  void carry_block_back(const NodeStep& s, std::size_t a, std::size_t v, const double* f,
                         const LaneRow<Lanes, 2 * V>& c, double middle, double node);
-  void carry_cross_back(const LaneRow<Lanes, 2 * V>& u, const LaneRow<Lanes, 2 * V>& c,
-                        const double* fb, double middle, double node);
+  void carry_cross_back(const NodeStep& s, const LaneRow<Lanes, 2 * V>& u,
+                        const LaneRow<Lanes, 2 * V>& c, const double* fb, double middle,
+                        double node);
 
   // stage_sweep_lanes.hpp defines this. Calls take(k, swing, base) with the step of each node, and
   // take_input(k, input) with the step of each input.
@@ -337,37 +402,13 @@ class LaneStages final : public StageKernel {
   void forward(const double* first, const StageArrays& at, const Take& take,
                const TakeInput& take_input) const;
 
-  static constexpr std::size_t kK = kLanes * V;
-  static constexpr std::size_t kM = kLanes * W;
-
-  template <std::size_t N>
-  using Numbers = KernelNumbers<Lanes, N>;
-
-  // p in the middle of an interval.
-  struct Middle {
-    // m of the swing, by models and by places; m of the base; and μ.
-    Numbers<2 * kM * kK> by_model;
-    Numbers<2 * kM * kK> by_place;
-    Numbers<3 * kM> base;
-    Numbers<kM> input;
-    // Σ α of the squares of p.
-    Numbers<4 * kK * kK> square;
-    Numbers<6 * kK> by_base;
-    std::array<std::array<double, 3>, 3> base_square{};
-    // Σ α μ m and Σ α μ².
-    Numbers<2 * kK> cross;
-    std::array<double, 3> base_cross{};
-    double curvature = 0.0;
-  };
-
   std::size_t groups_ = 0;
   std::size_t model_groups_ = 0;
   double jerk_weight_ = 0.0;
-  Numbers<4 * kK> own_;       // A, by parts
-  Numbers<2 * kK> by_accel_;  // a
-  Numbers<2 * kK> by_jerk_;   // β
-  Numbers<kM> share_;         // α
-  Numbers<kM> is_model_;      // 1, and 0 in a lane without a model
+  std::vector<NodeStep> steps_;
+  std::vector<std::uint32_t> step_of_;  // as in StageModel
+  Numbers<kM> share_;                   // α
+  Numbers<kM> is_model_;                // 1, and 0 in a lane without a model
   // A mode's gain in a model, by models and by modes.
   Numbers<kM * kK> by_model_;
   Numbers<kM * kK> by_mode_;
@@ -375,8 +416,7 @@ class LaneStages final : public StageKernel {
   Numbers<kK * kK> node_square_;
   Numbers<kK> node_cross_;
   double node_base_ = 0.0;
-  std::vector<char> in_one_model_;  // whether some model has modes of both groups
-  Middle middle_;
+  std::vector<char> in_one_model_;   // whether some model has modes of both groups
   Numbers<4 * kK * kK> cost_to_go_;  // P_ss
   Numbers<6 * kK> base_to_go_;       // P_bs
   std::array<std::array<double, 3>, 3> base_square_{};

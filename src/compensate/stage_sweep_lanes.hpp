@@ -18,7 +18,7 @@ void LaneStages<Lanes, V, W>::roll_out(double resting, StageArrays& at) const {
       }
     }
     at.inputs[k] = input;
-    step(at.states.data() + k * size, input, at.states.data() + (k + 1) * size);
+    step(step_at(k), at.states.data() + k * size, input, at.states.data() + (k + 1) * size);
   }
 }
 
@@ -40,12 +40,13 @@ void LaneStages<Lanes, V, W>::evaluate(StageArrays& at) const {
       store(pull, at.node_pull.data() + place);
       cost = cost + pull * error;
       if (k + 1 < at.nodes) {
-        Lanes middle = at.inputs[k] * load<Lanes>(middle_.input.at(kLanes * q));
+        const NodeStep& s = step_at(k);
+        Lanes middle = at.inputs[k] * load<Lanes>(s.middle.input.at(kLanes * q));
         for (std::size_t i = 0; i < 3; ++i) {
-          middle = middle + b[i] * load<Lanes>(middle_.base.at(i * models + kLanes * q));
+          middle = middle + b[i] * load<Lanes>(s.middle.base.at(i * models + kLanes * q));
         }
         for (std::size_t i = 0; i < swing; ++i) {
-          middle = middle + z[i] * load<Lanes>(middle_.by_place.at(i * models + kLanes * q));
+          middle = middle + z[i] * load<Lanes>(s.middle.by_place.at(i * models + kLanes * q));
         }
         const Lanes off = middle - load<Lanes>(at.middle_aim.data() + place);
         const Lanes middle_pull = at.middle_weight[k] * share * off;
@@ -122,20 +123,21 @@ void LaneStages<Lanes, V, W>::carry_slope_back(const PerKind<const double*>& for
   at.decrement = 0.0;
   add_node(at.nodes - 1);
   for (std::size_t k = at.nodes - 1; k-- > 0;) {
+    const NodeStep& s = step_at(k);
     Lanes by_input = broadcast<Lanes>(0.0);
     Lanes by_accel = broadcast<Lanes>(0.0);
     for (std::size_t v = 0; v < v_count; ++v) {
-      by_input = by_input + (jerk(0, v) * g[v] + jerk(1, v) * g[v_count + v]);
-      by_accel = by_accel + (accel(0, v) * g[v] + accel(1, v) * g[v_count + v]);
+      by_input = by_input + (jerk(s, 0, v) * g[v] + jerk(s, 1, v) * g[v_count + v]);
+      by_accel = by_accel + (accel(s, 0, v) * g[v] + accel(s, 1, v) * g[v_count + v]);
     }
     Lanes of_base[2] = {broadcast<Lanes>(0.0), broadcast<Lanes>(0.0)};
     const double* const pulls = at.middle_pull.data() + k * models;
     for (std::size_t q = 0; q < model_groups(); ++q) {
       const Lanes pull = load<Lanes>(pulls + kLanes * q);
-      by_input = by_input + pull * load<Lanes>(middle_.input.at(kLanes * q));
-      by_accel = by_accel + pull * load<Lanes>(middle_.base.at(2 * models + kLanes * q));
+      by_input = by_input + pull * load<Lanes>(s.middle.input.at(kLanes * q));
+      by_accel = by_accel + pull * load<Lanes>(s.middle.base.at(2 * models + kLanes * q));
       for (std::size_t i = 0; i < 2; ++i) {
-        of_base[i] = of_base[i] + pull * load<Lanes>(middle_.base.at(i * models + kLanes * q));
+        of_base[i] = of_base[i] + pull * load<Lanes>(s.middle.base.at(i * models + kLanes * q));
       }
     }
     const double down = jerk_weight * at.inputs[k] - (jerk_force != nullptr ? jerk_force[k] : 0.0) +
@@ -149,13 +151,13 @@ void LaneStages<Lanes, V, W>::carry_slope_back(const PerKind<const double*>& for
     for (std::size_t v = 0; v < v_count; ++v) {
       const Lanes y = g[v];
       const Lanes rate = g[v_count + v];
-      g[v] = own(0, v) * y + own(2, v) * rate;
-      g[v_count + v] = own(1, v) * y + own(3, v) * rate;
+      g[v] = own(s, 0, v) * y + own(s, 2, v) * rate;
+      g[v_count + v] = own(s, 1, v) * y + own(s, 3, v) * rate;
     }
     for (std::size_t c = 0; c < models; ++c) {
       for (std::size_t v = 0; v < 2 * v_count; ++v) {
         g[v] = g[v] +
-               pulls[c] * load<Lanes>(middle_.by_model.at(c * 2 * kLanes * v_count + kLanes * v));
+               pulls[c] * load<Lanes>(s.middle.by_model.at(c * 2 * kLanes * v_count + kLanes * v));
       }
     }
     for (std::size_t v = 0; v < 2 * v_count; ++v) {
@@ -192,6 +194,7 @@ void LaneStages<Lanes, V, W>::forward(const double* first, const StageArrays& at
     if (k + 1 == at.nodes) {
       return;
     }
+    const NodeStep& s = step_at(k);
     const double* const f = at.feedback.data() + k * state_size();
     Lanes by_swing = broadcast<Lanes>(0.0);
     for (std::size_t v = 0; v < 2 * g; ++v) {
@@ -204,8 +207,10 @@ void LaneStages<Lanes, V, W>::forward(const double* first, const StageArrays& at
     for (std::size_t v = 0; v < g; ++v) {
       const Lanes place = y[v];
       const Lanes rate = y[g + v];
-      y[v] = own(0, v) * place + own(1, v) * rate + (b[2] * accel(0, v) + input * jerk(0, v));
-      y[g + v] = own(2, v) * place + own(3, v) * rate + (b[2] * accel(1, v) + input * jerk(1, v));
+      y[v] = own(s, 0, v) * place + own(s, 1, v) * rate +
+             (b[2] * accel(s, 0, v) + input * jerk(s, 0, v));
+      y[g + v] = own(s, 2, v) * place + own(s, 3, v) * rate +
+                 (b[2] * accel(s, 1, v) + input * jerk(s, 1, v));
     }
     b[0] += b[1] + 0.5 * b[2] + kBaseByJerk[0] * input;
     b[1] += b[2] + kBaseByJerk[1] * input;

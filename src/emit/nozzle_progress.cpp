@@ -4,8 +4,8 @@
 #include <cmath>
 #include <limits>
 
-#include "followed.hpp"
 #include "unflex/core/foot.hpp"
+#include "unflex/dynamics/node_map.hpp"
 #include "unflex/planner/plan_times.hpp"
 
 namespace unflex::emit {
@@ -23,7 +23,8 @@ constexpr double kTowardsReference = 0.01;
 }  // namespace
 
 NozzleProgress::NozzleProgress(const Run& run, const std::vector<double>& starts_s,
-                               const Axes<dynamics::FlexibleAxis>& nozzle)
+                               const Axes<dynamics::FlexibleAxis>& nozzle,
+                               const dynamics::FieldXY& field)
     : moves_(run.moves), period_s_(run.base->period_s) {
   path_mm_.push_back(0.0);
   filament_mm_.push_back(0.0);
@@ -64,10 +65,23 @@ NozzleProgress::NozzleProgress(const Run& run, const std::vector<double>& starts
     state = riding(nozzle, xy_of(move.position_mm(local_s)),
                    move.velocity_mm_s(local_s) * xy_of(move.direction));
   }
-  const Followed x(*run.base, 0, nozzle.x, state.x);
-  const Followed y(*run.base, 1, nozzle.y, state.y);
+  using Maps = dynamics::FieldMaps<dynamics::NodeMap>;
+  Axes<Maps> maps = map_axes(
+      [&](const dynamics::FlexibleAxis& axis, const dynamics::FrequencyField& of_axis) {
+        return Maps(axis, of_axis, period_s_);
+      },
+      nozzle, field);
   double furthest = 0.0;
   for (std::size_t k = 0; k < run.base->nodes(); ++k) {
+    if (k > 0) {
+      const XY from_mm = run.base->node_mm(k - 1);
+      for_each_axis(
+          [&](Maps& of_axis, const dynamics::AxisTrajectory& base,
+              dynamics::NozzleState& of_nozzle) {
+            of_axis.at(from_mm).advance(base, k - 1, of_nozzle);
+          },
+          maps, *run.base, state);
+    }
     const double t = period_s_ * static_cast<double>(k);
     if (t < starts_s.front()) {
       // In the lead-in the nozzle may swing along the path, but the path has not begun.
@@ -75,7 +89,7 @@ NozzleProgress::NozzleProgress(const Run& run, const std::vector<double>& starts
       continue;
     }
     const double at_mm = reference_mm(t);
-    furthest = std::max(furthest, nearest_mm({x.at(t).position(), y.at(t).position()}, i, at_mm));
+    furthest = std::max(furthest, nearest_mm(dynamics::place_mm(state), i, at_mm));
     progress_mm_.push_back(furthest);
   }
 }

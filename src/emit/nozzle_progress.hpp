@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "unflex/dynamics/flexible_axis.hpp"
+#include "unflex/dynamics/frequency_field.hpp"
 #include "unflex/emit/run.hpp"
 
 namespace unflex::emit {
@@ -19,7 +20,7 @@ class NozzleProgress {
   // The nozzle hangs on the run's base. starts_s: when each move starts, and when the last one
   // ends.
   NozzleProgress(const Run& run, const std::vector<double>& starts_s,
-                 const Axes<dynamics::FlexibleAxis>& nozzle);
+                 const Axes<dynamics::FlexibleAxis>& nozzle, const dynamics::FieldXY& field);
 
   // Q(s_n(t)), mm, from 0 on. As the nozzle never goes back, it is monotone where Q is.
   [[nodiscard]] double filament_mm(double t) const;

@@ -298,7 +298,7 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
   const Timetable table(run);
   const std::vector<double> event_times_s = table.event_times_s();
   const LineRules rules = rules_for(run, options);
-  const NozzleProgress nozzle(run, table.starts_s(), rules.nozzle);
+  const NozzleProgress nozzle(run, table.starts_s(), rules.nozzle, rules.field);
   const Polygon vertices = polygon(
       run, table, nozzle, wanted_times(run, table, event_times_s, nozzle, options.has_free_timing),
       grid, rules, options);

@@ -73,6 +73,7 @@ std::string pack(const compensate::AxisWindow& window) {
   writer.value(window.period_s);
   writer.values(window.reference_mm);
   writer.values(window.weight);
+  writer.values(window.freq_shares);
   writer.value(window.aims_mm.size());
   for (const std::vector<double>& aim_mm : window.aims_mm) {
     writer.values(aim_mm);
@@ -97,6 +98,7 @@ compensate::AxisWindow unpack_window(std::string_view bytes) {
   window.period_s = reader.value<double>();
   window.reference_mm = reader.values();
   window.weight = reader.values();
+  window.freq_shares = reader.values();
   window.aims_mm.resize(reader.value<std::size_t>());
   for (std::vector<double>& aim_mm : window.aims_mm) {
     aim_mm = reader.values();

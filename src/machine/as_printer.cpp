@@ -47,18 +47,42 @@ dynamics::FlexibleAxis flexible_axis(const AxisDynamics& dynamics) {
                                 : flexible_axis(dynamics.modes);
 }
 
+dynamics::FrequencyField frequency_field(const AxisDynamics& dynamics) {
+  dynamics::FrequencyField field;
+  for (const FrequencyMap& map : dynamics.map) {
+    if (map.is_over_bed()) {
+      dynamics::SharesAlong& along = map.along == 'x' ? field.x : field.y;
+      along.at_mm = map.at_mm;
+      for (const double hz : map.freq_hz) {
+        along.share.push_back(hz / dynamics.freq_hz);
+      }
+    }
+  }
+  return field;
+}
+
 dynamics::FlexibleAxis behind(const dynamics::FlexibleAxis& axis, double freq_hz,
                               double damping_ratio) {
   return freq_hz > 0.0 ? axis.followed_by(2.0 * std::numbers::pi * freq_hz, damping_ratio) : axis;
 }
 
-Settings with_frequencies(Settings settings, const Axes<double>& shares) {
+// At the place that by_place is for, the product of all maps over the bed is by_place times the
+// given frequency. So the first map is divided by by_place once its frequencies have become shares
+// of the new frequency.
+Settings with_frequencies(Settings settings, const Axes<FrequencyShare>& shares) {
   for_each_axis(
-      [](AxisDynamics& axis, double& second_hz, double share) {
+      [](AxisDynamics& axis, double& second_hz, const FrequencyShare& by) {
+        const double share = by.by_print * by.by_place;
+        std::erase_if(axis.map, [](const FrequencyMap& map) { return !map.is_over_bed(); });
+        for (FrequencyMap& map : axis.map) {
+          const double times = &map == axis.map.data() ? by.by_print : share;
+          for (double& hz : map.freq_hz) {
+            hz *= times;
+          }
+        }
         axis.freq_hz *= share;
         second_hz *= share;
         axis.moving_mass_g = 0.0;
-        axis.map.clear();
         for (ModeSettings& mode : axis.modes) {
           mode.freq_hz *= share;
         }

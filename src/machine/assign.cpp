@@ -317,9 +317,10 @@ std::string store(const Table& table, const std::string& whose, FrequencyMap& ma
   }
   const NamedValue* const along = find(table, "along");
   const auto* axis = along != nullptr ? std::get_if<std::string>(&along->value.content) : nullptr;
-  if (axis == nullptr || *axis != "z") {
-    return fmt::format("{}: along must be \"z\"; unflex follows no map along X or Y yet", whose);
+  if (axis == nullptr || (*axis != "x" && *axis != "y" && *axis != "z")) {
+    return fmt::format("{}: along must be \"x\", \"y\" or \"z\"", whose);
   }
+  map.along = axis->front();
   map.at_mm = points_of(table, "at_mm");
   map.freq_hz = points_of(table, "freq_hz");
   if (map.at_mm.size() < 2 || map.at_mm.size() > kMostPoints ||
@@ -340,15 +341,23 @@ std::string store(const Table& table, const std::string& whose, FrequencyMap& ma
 }
 
 std::string store(const Value& value, const Key& key, std::vector<FrequencyMap>& target) {
-  const auto tables = tables_of(value, 1, 1);
+  constexpr std::size_t kDirections = 3;
+  const auto tables = tables_of(value, 1, kDirections);
   if (!tables) {
-    return fmt::format("{} must be one table, [[{}]], with along, at_mm and freq_hz", key.name,
-                       key.name);
+    return fmt::format("{} must be 1 to {} tables, [[{}]], with along, at_mm and freq_hz", key.name,
+                       kDirections, key.name);
   }
-  std::vector<FrequencyMap> maps(1);
-  if (std::string wrong = store(*tables->front(), std::string(key.name), maps.front());
-      !wrong.empty()) {
-    return wrong;
+  std::vector<FrequencyMap> maps;
+  for (const Table* const table : *tables) {
+    FrequencyMap map;
+    if (std::string wrong = store(*table, std::string(key.name), map); !wrong.empty()) {
+      return wrong;
+    }
+    if (std::ranges::count(maps, map.along, &FrequencyMap::along) > 0) {
+      return fmt::format("{}: two tables are along \"{}\", but there may be one for each direction",
+                         key.name, map.along);
+    }
+    maps.push_back(std::move(map));
   }
   target = std::move(maps);
   return {};

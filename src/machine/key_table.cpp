@@ -207,9 +207,11 @@ constexpr std::array kOtherKeys = {
         "Mass of a bed that moves along X, without a print: frequencies are those of the empty bed "
         "and fall while the print grows; 0: the bed does not move along X"},
     Key{"dynamics.x.map", &axis_setting<&S::dynamics, 0, &D::map>, kAny, "",
-        "Frequencies along X at some heights: [[dynamics.x.map]] with along = \"z\", at_mm and "
-        "freq_hz, both lists; freq_hz is then the frequency that all else is told for",
-        "the same at all heights"},
+        "Frequencies along X at some places of the nozzle: [[dynamics.x.map]] with along, \"x\", "
+        "\"y\" or \"z\", and the lists at_mm and freq_hz; maps along several directions multiply "
+        "as "
+        "shares of freq_hz",
+        "the same everywhere"},
     Key{"dynamics.x.mode", &axis_setting<&S::dynamics, 0, &D::modes>, kAny, "",
         "Modes along X, in place of freq_hz and damping_ratio: [[dynamics.x.mode]] with freq_hz, "
         "damping_ratio and gain; the gains add up to 1",
@@ -254,9 +256,11 @@ constexpr std::array kOtherKeys = {
         "Mass of a bed that moves along Y, without a print: frequencies are those of the empty bed "
         "and fall while the print grows; 0: the bed does not move along Y"},
     Key{"dynamics.y.map", &axis_setting<&S::dynamics, 1, &D::map>, kAny, "",
-        "Frequencies along Y at some heights: [[dynamics.y.map]] with along = \"z\", at_mm and "
-        "freq_hz, both lists; freq_hz is then the frequency that all else is told for",
-        "the same at all heights"},
+        "Frequencies along Y at some places of the nozzle: [[dynamics.y.map]] with along, \"x\", "
+        "\"y\" or \"z\", and the lists at_mm and freq_hz; maps along several directions multiply "
+        "as "
+        "shares of freq_hz",
+        "the same everywhere"},
     Key{"dynamics.y.mode", &axis_setting<&S::dynamics, 1, &D::modes>, kAny, "",
         "Modes along Y, in place of freq_hz and damping_ratio: [[dynamics.y.mode]] with freq_hz, "
         "damping_ratio and gain; the gains add up to 1",

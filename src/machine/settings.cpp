@@ -267,21 +267,33 @@ double Settings::base_max_accel_mm_s2(double asked_mm_s2) const {
                   std::min(base_accel_times_asked() * asked_mm_s2, most));
 }
 
+double FrequencyMap::hz_at(double place_mm) const {
+  const auto above = std::ranges::upper_bound(at_mm, place_mm);
+  const auto next = static_cast<std::size_t>(above - at_mm.begin());
+  if (next == 0 || next == at_mm.size()) {
+    return next == 0 ? freq_hz.front() : freq_hz.back();
+  }
+  return std::lerp(freq_hz[next - 1], freq_hz[next],
+                   (place_mm - at_mm[next - 1]) / (at_mm[next] - at_mm[next - 1]));
+}
+
 // f = f₀ √(m₀ / (m₀ + m)): the belt stays as stiff while the mass on it grows.
 double AxisDynamics::frequency_share(const MachineState& state) const {
   double share = moving_mass_g > 0.0
                      ? std::sqrt(moving_mass_g / (moving_mass_g + std::max(state.printed_g, 0.0)))
                      : 1.0;
   for (const FrequencyMap& one : map) {
-    const auto above = std::ranges::upper_bound(one.at_mm, state.height_mm);
-    const auto next = static_cast<std::size_t>(above - one.at_mm.begin());
-    double hz = next == 0 ? one.freq_hz.front() : one.freq_hz[next - 1];
-    if (next > 0 && next < one.at_mm.size()) {
-      hz = std::lerp(
-          hz, one.freq_hz[next],
-          (state.height_mm - one.at_mm[next - 1]) / (one.at_mm[next] - one.at_mm[next - 1]));
+    share *= one.along == 'z' ? one.hz_at(state.height_mm) / freq_hz : 1.0;
+  }
+  return share * share_at(state.place_mm);
+}
+
+double AxisDynamics::share_at(const Axes<double>& place_mm) const {
+  double share = 1.0;
+  for (const FrequencyMap& one : map) {
+    if (one.is_over_bed()) {
+      share *= one.hz_at(one.along == 'x' ? place_mm.x : place_mm.y) / freq_hz;
     }
-    share *= hz / freq_hz;
   }
   return share;
 }
@@ -321,8 +333,8 @@ std::string AxisDynamics::description() const {
     text += fmt::format(", on a bed of {:.4g} g that gets heavier", moving_mass_g);
   }
   for (const FrequencyMap& one : map) {
-    text +=
-        fmt::format(", {:.4g} to {:.4g} Hz by the height", one.freq_hz.front(), one.freq_hz.back());
+    text += fmt::format(", {:.4g} to {:.4g} Hz along {}", one.freq_hz.front(), one.freq_hz.back(),
+                        static_cast<char>(one.along - 'x' + 'X'));
   }
   return text;
 }

@@ -53,11 +53,10 @@ Status check_maps(const Draft& draft) {
     }
     const std::string map = fmt::format("dynamics.{}.map", axis);
     const std::string mode = fmt::format("dynamics.{}.mode", axis);
-    return conflict(
-        draft, {map, mode},
-        fmt::format("{} tells one frequency at each height, and {} several; take one of "
-                    "them away",
-                    map, mode));
+    return conflict(draft, {map, mode},
+                    fmt::format("{} tells one frequency at each place, and {} several; take one of "
+                                "them away",
+                                map, mode));
   };
   return each_in_turn(check, kAxisKeys, draft.settings.dynamics);
 }

@@ -27,11 +27,18 @@ double largest_motor_accel(const std::vector<planner::PlannedMove>& moves, const
   return largest;
 }
 
+// Mass and height in the middle of the run, and the mean of its places.
 machine::MachineState state_in_middle(const Piece& run, double filament_g_per_mm) {
   const gcode::Position& begin = run.moves.front().segment.start_mm;
   const gcode::Position& end = run.moves.back().segment.end_mm;
+  XY sum_mm_s;
+  for (const planner::PlannedMove& move : run.moves) {
+    const gcode::Segment& segment = move.segment;
+    sum_mm_s =
+        sum_mm_s + 0.5 * move.duration_s() * (xy_of(segment.start_mm) + xy_of(segment.end_mm));
+  }
   return {filament_g_per_mm * 0.5 * (begin[gcode::E] + end[gcode::E]),
-          0.5 * (begin[gcode::Z] + end[gcode::Z])};
+          0.5 * (begin[gcode::Z] + end[gcode::Z]), sum_mm_s / planner::duration_s(run.moves)};
 }
 
 }  // namespace

@@ -37,6 +37,7 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
   options.lines.tolerance_mm = settings.tolerance_um() * 1e-3;
   // The costs of lines leave out the lead of modes behind each other.
   options.lines.nozzle = machine::nozzle_axes(settings);
+  options.lines.field = map_axes(machine::frequency_field, settings.dynamics);
   options.lines.freq_error = settings.freq_error();
   const auto reach = [](const std::optional<machine::Range>& travel) {
     return travel ? emit::Reach{travel->min, travel->max} : emit::Reach{.min_mm = 0.0};

@@ -28,14 +28,14 @@ verify::RunDeviation deviation_of(const Piece& run,
                                   double lead_in_s) {
   const verify::NozzleModel model = verify::coarse(rules.nozzle);
   if (run.begins_run() && run.ends_run()) {
-    return verify::measure(reference_moves, base, nozzle, model, lead_in_s);
+    return verify::measure(reference_moves, base, nozzle, model, rules.change, lead_in_s);
   }
   // The base may be a little ahead of the plan or behind it, so the reference includes the moves
   // around the part.
   std::vector<planner::PlannedMove> reference = run.before;
   reference.insert(reference.end(), reference_moves.begin(), reference_moves.end());
   reference.insert(reference.end(), run.after.begin(), run.after.end());
-  return verify::measure(reference, base, nozzle, model,
+  return verify::measure(reference, base, nozzle, model, rules.change,
                          lead_in_s - planner::duration_s(run.before), !run.ends_run());
 }
 

@@ -12,6 +12,10 @@ namespace {
 // Rules are made for frequencies that are this far apart, as a difference of logarithms.
 constexpr double kStep = 1e-3;
 
+std::int64_t step_of(double share) {
+  return static_cast<std::int64_t>(std::round(math::log(share) / kStep));
+}
+
 }  // namespace
 
 MachineModel::MachineModel(const machine::Settings& settings,
@@ -25,19 +29,21 @@ std::shared_ptr<const RunRules> MachineModel::at(const machine::MachineState& st
   if (!settings_.changes()) {
     return given_;
   }
-  const auto step_of = [&](const machine::AxisDynamics& axis) {
-    return static_cast<std::int64_t>(std::round(math::log(axis.frequency_share(state)) / kStep));
+  const auto steps_of = [&](const machine::AxisDynamics& axis) {
+    const double by_place = axis.share_at(state.place_mm);
+    return Steps{step_of(axis.frequency_share(state) / by_place), step_of(by_place)};
   };
-  const auto steps = map_axes(step_of, settings_.dynamics);
+  const Axes<Steps> steps = map_axes(steps_of, settings_.dynamics);
   if (steps != steps_) {
     steps_ = steps;
-    const auto share_of = [](std::int64_t step) {
-      return math::exp(kStep * static_cast<double>(step));
+    const auto share_of = [](const Steps& of_axis) {
+      return machine::FrequencyShare{math::exp(kStep * static_cast<double>(of_axis.by_print)),
+                                     math::exp(kStep * static_cast<double>(of_axis.by_place))};
     };
-    const bool is_given = steps == on_all_axes<std::int64_t>(0);
-    present_ = is_given ? given_
-                        : std::make_shared<RunRules>(rules_for_(
-                              machine::with_frequencies(settings_, map_axes(share_of, steps))));
+    present_ = steps == Axes<Steps>{}
+                   ? given_
+                   : std::make_shared<RunRules>(rules_for_(
+                         machine::with_frequencies(settings_, map_axes(share_of, steps))));
   }
   return present_;
 }

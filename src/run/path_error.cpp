@@ -12,10 +12,10 @@ namespace {
 // target(t, sliced): where the nozzle should be t after the base has begun; nullopt where that
 // ends.
 template <typename Target>
-void add_error(const RunOnBase& run, const verify::NozzleModel& model, const Target& target,
-               PathError& error) {
+void add_error(const RunOnBase& run, const verify::NozzleModel& model,
+               const dynamics::FieldXY& field, const Target& target, PathError& error) {
   dynamics::NozzleXY nozzle = run.start;
-  const NozzleOnBase on_base(run.base, model);
+  NozzleOnBase on_base(run.base, model, field);
   planner::PlanCursor sliced(run.plan);
   for (std::size_t k = 0; k + 1 < run.base.nodes(); ++k) {
     const double t = static_cast<double>(k + 1) * run.base.period_s;
@@ -53,10 +53,11 @@ double PathError::rms_mm() const {
   return samples > 0 ? std::sqrt(sum_mm2 / static_cast<double>(samples)) : 0.0;
 }
 
-PathError path_error(const RunOnBase& run, const verify::NozzleModel& model) {
+PathError path_error(const RunOnBase& run, const verify::NozzleModel& model,
+                     const dynamics::FieldXY& field) {
   PathError error;
   add_error(
-      run, model,
+      run, model, field,
       [](double, const planner::PlanCursor& sliced) {
         return std::optional(xy_of(sliced.position_mm()));
       },
@@ -74,7 +75,7 @@ void add_emission_error(const RunOnBase& run, const std::vector<planner::Planned
     });
     return emitted.at_end() ? std::nullopt : std::optional(dynamics::place_mm(real));
   };
-  add_error(run, model, replay, error);
+  add_error(run, model, {}, replay, error);
 }
 
 }  // namespace unflex::run

@@ -86,8 +86,9 @@ void measure_robustness(RunJob& job, const verify::NozzleModel& model) {
   if (const std::optional<dynamics::BaseTrajectory> nominal = nominal_base(job)) {
     const std::vector<planner::PlannedMove>& plan = job.reference();
     const double lead_in_s = job.lead_in_s();
-    job.robustness.robust = path_error({plan, lead_in_s, job.base, job.nozzle}, model);
-    job.robustness.nominal = path_error({plan, lead_in_s, *nominal, job.nozzle}, model);
+    const dynamics::FieldXY field = compensate::field_of(job.setup);
+    job.robustness.robust = path_error({plan, lead_in_s, job.base, job.nozzle}, model, field);
+    job.robustness.nominal = path_error({plan, lead_in_s, *nominal, job.nozzle}, model, field);
   }
 }
 
@@ -107,8 +108,8 @@ void set_probe(const compensate::Engine& engine, compensate::AxisWindow window,
     probe.solution = solution;
     return;
   }
-  for (std::vector<double>* values : {&window.reference_mm, &window.weight}) {
-    values->resize(2 * most - 1);
+  for (std::vector<double>* values : {&window.reference_mm, &window.weight, &window.freq_shares}) {
+    values->resize(std::min(values->size(), 2 * most - 1));
   }
   for (std::vector<double>& aim_mm : window.aims_mm) {
     aim_mm.resize(2 * most - 1);

@@ -60,6 +60,7 @@ compensate::AxisSetup axis_setup(const machine::AxisDynamics& dynamics,
                                  const machine::Settings& settings) {
   compensate::AxisSetup setup;
   setup.axis = machine::flexible_axis(dynamics);
+  setup.field = machine::frequency_field(dynamics);
   setup.plants = plants(dynamics, settings);
   const Motors motors = settings.motors();
   setup.limits.max_velocity_mm_s = settings.base_max_velocity_mm_s() / motors.gain_of_xy();

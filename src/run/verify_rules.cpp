@@ -29,11 +29,13 @@ std::vector<verify::NozzleModel> nozzles_of_plants(const machine::Settings& sett
 }
 
 verify::AxisChange change_of(const machine::AxisDynamics& axis) {
-  verify::AxisChange change{axis.moving_mass_g, {}, {}};
+  verify::AxisChange change{axis.moving_mass_g, {}};
   for (const machine::FrequencyMap& map : axis.map) {
-    change.heights_mm = map.at_mm;
+    verify::ShareMap& shares = change.maps.emplace_back();
+    shares.along = static_cast<std::size_t>(map.along - 'x');
+    shares.at_mm = map.at_mm;
     for (const double freq_hz : map.freq_hz) {
-      change.shares.push_back(freq_hz / axis.freq_hz);
+      shares.share.push_back(freq_hz / axis.freq_hz);
     }
   }
   return change;

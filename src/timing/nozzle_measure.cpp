@@ -122,10 +122,10 @@ class Walk {
           allowance_(allowance),
           laid_(laid),
           maps_(map_axes(
-              [&](const dynamics::FlexibleAxis& axis) {
-                return dynamics::ExactMap(axis, walk.base_.period_s / kLooks);
+              [&](const dynamics::FlexibleAxis& axis, const dynamics::FrequencyField& field) {
+                return Maps(axis, field, walk.base_.period_s / kLooks);
               },
-              model)),
+              model, model.field)),
           nozzle_(start),
           last_mm_(dynamics::place_mm(start)),
           nodes_(1),
@@ -140,9 +140,12 @@ class Walk {
           nodes_.emplace_back();
         }
         const Look& look = looks[i];
-        for_each_axis([](const dynamics::ExactMap& map, const dynamics::BaseSegment& base,
-                         dynamics::NozzleState& nozzle) { map.advance(base, nozzle); },
-                      maps_, look.base, nozzle_);
+        const XY from_mm = dynamics::place_mm(look.base);
+        for_each_axis(
+            [&](Maps& maps, const dynamics::BaseSegment& base, dynamics::NozzleState& nozzle) {
+              maps.at(from_mm).advance(base, nozzle);
+            },
+            maps_, look.base, nozzle_);
         if (look.now) {
           see(*look.now, look.reference_mm);
         }
@@ -167,6 +170,8 @@ class Walk {
     }
 
    private:
+    using Maps = dynamics::FieldMaps<dynamics::ExactMap>;
+
     void see(std::size_t now, double reference_mm) {
       const XY at_mm = dynamics::place_mm(nozzle_);
       const XY velocity_mm_s =
@@ -219,7 +224,7 @@ class Walk {
     const AxesModel* model_;
     std::span<const double> allowance_;
     Laid* laid_;
-    Axes<dynamics::ExactMap> maps_;
+    Axes<Maps> maps_;
     dynamics::NozzleXY nozzle_;
     XY last_mm_;
     Place furthest_;
@@ -347,7 +352,8 @@ std::vector<AxesModel> models_of(const compensate::Setup& setup) {
     const auto model =
         map_axes([&](const Models& each) { return each[i < each.size() ? i : 0]; }, all);
     models.push_back({map_axes([](const Model& each) { return each.axis; }, model),
-                      most_of_axes([](const Model& each) { return each.times_tolerance; }, model)});
+                      most_of_axes([](const Model& each) { return each.times_tolerance; }, model),
+                      compensate::field_of(setup)});
   }
   return models;
 }

@@ -31,6 +31,7 @@ inline constexpr double kLeastShare = 0.05;
 // Models of both axes.
 struct AxesModel : Axes<dynamics::FlexibleAxis> {
   double times_tolerance = 1.0;  // how many tolerances its nozzle may stray
+  dynamics::FieldXY field = {};
 };
 
 // All models for which a tolerance shall hold: the axes as given, and the axes at the edges of

@@ -66,7 +66,8 @@ RunError run_error(double contour2_mm2_s, double contour_max_mm, double duration
 
 RunDeviation measure(const std::vector<planner::PlannedMove>& reference,
                      const std::vector<planner::PlannedMove>& base, NozzleXY start,
-                     const NozzleModel& model, double lead_in_s, bool goes_on) {
+                     const NozzleModel& model, const MachineChange& change, double lead_in_s,
+                     bool goes_on) {
   std::size_t taken = 0;
   ReferencePath path([&](ReferenceMove& next) {
     if (taken == reference.size()) {
@@ -86,6 +87,9 @@ RunDeviation measure(const std::vector<planner::PlannedMove>& reference,
   }
   meter.look();
   for (const planner::PlannedMove& move : base) {
+    if (change.acts()) {
+      meter.set_machine(change, move.segment.start_mm);
+    }
     meter.play(move);
     path.discard_before(meter.time_s() - meter.reach_s());
   }

@@ -55,6 +55,12 @@ void Meter::watch(Observer* observer, NozzleBase base) {
 
 void Meter::drop_others() { bundle_.keep_first(); }
 
+void Meter::set_machine(const MachineChange& change, const gcode::Position& at) {
+  over_bed_ = change.acts_over_bed() ? &change : nullptr;
+  machine_at_mm_ = at;
+  bundle_.set_frequencies(change.frequency_shares(at));
+}
+
 void Meter::follow_line(const LineModel& model) {
   line_.emplace(model);
   line_->watch(observer_, {base_, 0});
@@ -209,6 +215,10 @@ double Meter::next_reference_change() {
 
 // Moves base and nozzles by h seconds. rides: the nozzles rest on the base and stay at rest on it.
 void Meter::step(BasePhase& phase, double h, bool rides) {
+  if (over_bed_ != nullptr && !rides) {
+    set_xy(machine_at_mm_, dynamics::place_mm(phase.xy));
+    bundle_.set_frequencies(over_bed_->frequency_shares(machine_at_mm_));
+  }
   bundle_.step(phase.xy);
   advance(phase.xy, h);
   advance(phase.e, h);

@@ -15,6 +15,7 @@
 #include "reference_phase.hpp"
 #include "shaped_base.hpp"
 #include "unflex/verify/deviation.hpp"
+#include "unflex/verify/machine_change.hpp"
 #include "unflex/verify/near_path.hpp"
 #include "unflex/verify/observer.hpp"
 #include "unflex/verify/reference_path.hpp"
@@ -79,8 +80,9 @@ class Meter {
   void watch(Observer* observer, NozzleBase base);
   // Keeps the first nozzle alone from now on.
   void drop_others();
-  // From now on all frequencies of an axis are this many times those of the models.
-  void set_frequencies(const Axes<double>& shares) { bundle_.set_frequencies(shares); }
+  // From now on the frequencies are those of a machine that is at this place. Over the bed they
+  // follow the base. `change` must outlive the meter.
+  void set_machine(const MachineChange& change, const gcode::Position& at);
   // How many others there are, and how far they stray.
   [[nodiscard]] std::size_t others() const { return bundle_.count() - 1; }
   [[nodiscard]] Deviation deviation_of_other(std::size_t number) const {
@@ -187,7 +189,9 @@ class Meter {
   std::optional<Sample> last_look_;
   bool last_measured_ = false;
   XY base_mm_;
-  std::size_t current_ = 0;  // piece of the reference at time_s_
+  const MachineChange* over_bed_ = nullptr;  // set while frequencies change over the bed
+  gcode::Position machine_at_mm_{};          // where they are those of bundle_
+  std::size_t current_ = 0;                  // piece of the reference at time_s_
   NearPath near_;
   DeviationAccumulator extruding_;
   DeviationAccumulator all_;

@@ -31,7 +31,10 @@ class Nozzles {
     return main_.deviation_of_other(number);
   }
 
-  void set_frequencies(const Axes<double>& shares) { main_.set_frequencies(shares); }
+  // As Meter::set_machine().
+  void set_machine(const MachineChange& change, const gcode::Position& at) {
+    main_.set_machine(change, at);
+  }
 
   // The clock of the moves that have been played; the nozzles are no further than that.
   [[nodiscard]] double plan_time_s() const;

@@ -165,11 +165,11 @@ void Verifier::begin_paths(bool compensated) {
   }
 }
 
-// The machine is in a move as where the move begins.
+// Mass and height are in a move as where the move begins.
 template <class Hung>
 void Verifier::change_machine(const planner::PlannedMove& move, Hung& nozzles) const {
   if (rules_.change.acts()) {
-    nozzles.set_frequencies(rules_.change.frequency_shares(move.segment.start_mm));
+    nozzles.set_machine(rules_.change, move.segment.start_mm);
   }
 }
 

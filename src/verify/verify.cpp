@@ -1,8 +1,5 @@
 #include "unflex/verify/verify.hpp"
 
-#include <algorithm>
-#include <cmath>
-
 #include "verifier.hpp"
 
 namespace unflex::verify {
@@ -17,26 +14,6 @@ PlayedFile played(Meter& meter, const Track& track) {
 }
 
 }  // namespace
-
-Axes<double> MachineChange::frequency_shares(const gcode::Position& at) const {
-  const double printed_g = std::max(at[gcode::E], 0.0) * filament_g_per_mm;
-  const double height_mm = at[gcode::Z];
-  const auto share_of = [&](const AxisChange& axis) {
-    const double mass_g = axis.moving_mass_g;
-    double share = mass_g > 0.0 ? std::sqrt(mass_g / (mass_g + printed_g)) : 1.0;
-    if (axis.heights_mm.empty()) {
-      return share;
-    }
-    double at_height = axis.shares.front();
-    for (std::size_t i = 1; i < axis.heights_mm.size(); ++i) {
-      const double span_mm = axis.heights_mm[i] - axis.heights_mm[i - 1];
-      const double part = std::clamp((height_mm - axis.heights_mm[i - 1]) / span_mm, 0.0, 1.0);
-      at_height += part * (axis.shares[i] - axis.shares[i - 1]);
-    }
-    return share * at_height;
-  };
-  return map_axes(share_of, axes);
-}
 
 VerifyReport Verifier::report() {
   VerifyReport report = totals_;

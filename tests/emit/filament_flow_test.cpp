@@ -132,7 +132,7 @@ struct Nozzle {
     Run run;
     run.moves = &moves;
     run.base = &base;
-    return {run, starts_s, on_all_axes(axis)};
+    return {run, starts_s, on_all_axes(axis), {}};
   }
 
   // Filament of the sliced path at time t of the plan.

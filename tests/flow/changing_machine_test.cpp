@@ -72,18 +72,44 @@ TEST(AMovingBed, OfAWholeTonStaysAsItIs) {
   EXPECT_EQ(made(with(kExact, {"dynamics.y.moving_mass_g=1e6"})).text, made(kExact).text);
 }
 
-// Most of the print lies at 0.2 mm, where the frequency has fallen by a tenth.
-TEST(AMapOfHeights, IsFollowedRunByRun) {
-  const std::string map = "dynamics.y.map=[{along = \"z\", at_mm = [0, 0.2], freq_hz = [38, 34]}]";
+// Holds the print made for a machine with this setting against the print that ignores it, and
+// against a machine that does not change.
+void expect_followed(const std::string& setting) {
   const Made constant = made(kExact);
-  const Made followed = made(with(kExact, {map}));
-  EXPECT_LE(rms_mm(followed.report), 1.3 * rms_mm(constant.report));
-  const JobFolder ignored(print(), with(kExact, {map}));
+  const Made followed = made(with(kExact, {setting}));
+  EXPECT_LE(rms_mm(followed.report), 1.3 * rms_mm(constant.report)) << setting;
+  const JobFolder ignored(print(), with(kExact, {setting}));
   ignored.set_output(constant.text);
   SilentProgress progress;
   const Result<report::Report> measured = verify(ignored.job(), progress);
   ASSERT_TRUE(measured) << to_string(measured.error());
-  EXPECT_LE(rms_mm(followed.report), 0.3 * rms_mm(*measured));
+  EXPECT_LE(rms_mm(followed.report), 0.3 * rms_mm(*measured)) << setting;
+}
+
+// Most of the print lies at 0.2 mm, where the frequency has fallen by a tenth.
+TEST(AMapOfHeights, IsFollowedRunByRun) {
+  expect_followed("dynamics.y.map=[{along = \"z\", at_mm = [0, 0.2], freq_hz = [38, 34]}]");
+}
+
+TEST(AMapOverTheBed, IsFollowedWithinRuns) {
+  expect_followed("dynamics.y.map=[{along = \"x\", at_mm = [120, 210], freq_hz = [40, 34]}]");
+  expect_followed("dynamics.y.map=[{along = \"y\", at_mm = [140, 210], freq_hz = [34, 40]}]");
+}
+
+TEST(AMapOverTheBed, IsTheSameForAnyNumberOfWorkers) {
+  const std::string map =
+      "dynamics.y.map=[{along = \"x\", at_mm = [120, 210], freq_hz = [40, 34]}]";
+  EXPECT_EQ(made(with(kExact, {map}), 1).text, made(with(kExact, {map}), 3).text);
+}
+
+// The timing is chosen for the frequencies of the place, too.
+TEST(AMapOverTheBed, LetsTheTimingBeFree) {
+  const std::vector<std::string> fast = {
+      "timing.tolerance_um=20",
+      "dynamics.y.map=[{along = \"x\", at_mm = [120, 210], freq_hz = [40, 34]}]"};
+  const Made faster = made(with(kExact, fast));
+  const verify::Measured& measured = faster.report.measured;
+  EXPECT_LT(measured.compensated.time_s, 0.99 * measured.uncompensated.time_s);
 }
 
 }  // namespace

@@ -586,14 +586,28 @@ TEST(AFrequencyMap, IsReadFromATableOfPoints) {
   EXPECT_FALSE(Settings{}.changes());
 }
 
+TEST(AFrequencyMap, MayBeAlongEachDirection) {
+  const Settings s = read(
+      "[[dynamics.x.map]]\nalong = \"x\"\nat_mm = [0, 100]\nfreq_hz = [45, 36]\n"
+      "[[dynamics.x.map]]\nalong = \"y\"\nat_mm = [0, 100]\nfreq_hz = [45, 54]\n"
+      "[[dynamics.x.map]]\nalong = \"z\"\nat_mm = [0, 100]\nfreq_hz = [45, 22.5]\n");
+  ASSERT_EQ(s.dynamics.x.map.size(), 3U);
+  EXPECT_NEAR(s.dynamics.x.frequency_share({.height_mm = 100.0, .place_mm = {50.0, 25.0}}),
+              0.9 * 1.05 * 0.5, 1e-12);
+  EXPECT_NEAR(s.dynamics.x.share_at({50.0, 25.0}), 0.9 * 1.05, 1e-12);
+}
+
 TEST(AFrequencyMap, ThatIsWrongIsRefusedWithItsPlace) {
   const auto error = [](const std::string& text) {
     const Result<Settings> settings = parse("[limits]\n[[dynamics.x.map]]\n" + text, "p.toml", {});
     return settings ? std::string("none") : to_string(settings.error());
   };
   using ::testing::HasSubstr;
-  EXPECT_THAT(error("along = \"x\"\nat_mm = [0, 1]\nfreq_hz = [40, 41]\n"),
-              HasSubstr("along must be \"z\""));
+  EXPECT_THAT(error("along = \"w\"\nat_mm = [0, 1]\nfreq_hz = [40, 41]\n"),
+              HasSubstr("along must be \"x\", \"y\" or \"z\""));
+  EXPECT_THAT(error("along = \"x\"\nat_mm = [0, 1]\nfreq_hz = [40, 41]\n[[dynamics.x.map]]\n"
+                    "along = \"x\"\nat_mm = [0, 1]\nfreq_hz = [40, 41]\n"),
+              HasSubstr("two tables are along \"x\""));
   EXPECT_THAT(error("along = \"z\"\nat_mm = [0, 1]\nfreq_hz = [40]\n"),
               HasSubstr("must be lists of 2 to 100 numbers, as many of each"));
   EXPECT_THAT(error("along = \"z\"\nat_mm = [1, 1]\nfreq_hz = [40, 41]\n"),
@@ -605,7 +619,7 @@ TEST(AFrequencyMap, ThatIsWrongIsRefusedWithItsPlace) {
   EXPECT_THAT(error("along = \"z\"\nat_mm = [0, 1]\nfreq_hz = [40, 41]\n"
                     "[[dynamics.x.mode]]\nfreq_hz = 40\ndamping_ratio = 0.1\ngain = 0.5\n"
                     "[[dynamics.x.mode]]\nfreq_hz = 60\ndamping_ratio = 0.1\ngain = 0.5\n"),
-              HasSubstr("tells one frequency at each height"));
+              HasSubstr("tells one frequency at each place"));
 }
 
 }  // namespace

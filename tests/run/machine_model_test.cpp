@@ -41,7 +41,7 @@ TEST(AMovingBed, SwingsSlowerByTheRootOfItsMass) {
 TEST(AMapOfHeights, GivesTheFrequencyOfTheHeight) {
   machine::Settings settings = flow::testing::settings();
   settings.dynamics.x.freq_hz = 45.0;
-  settings.dynamics.x.map = {{"z", {0.0, 100.0, 200.0}, {45.0, 42.5, 30.0}}};
+  settings.dynamics.x.map = {{'z', {0.0, 100.0, 200.0}, {45.0, 42.5, 30.0}}};
   MachineModel machine(settings, rules_for);
   for (const auto& [height_mm, hz] :
        {std::pair{-5.0, 45.0}, std::pair{0.0, 45.0}, std::pair{50.0, 43.75}, std::pair{100.0, 42.5},
@@ -51,10 +51,39 @@ TEST(AMapOfHeights, GivesTheFrequencyOfTheHeight) {
   }
 }
 
+// The rules have the frequency near the run, and windows those of the places.
+TEST(AMapOverTheBed, GivesTheFrequencyOfThePlace) {
+  machine::Settings settings = flow::testing::settings();
+  settings.dynamics.x.freq_hz = 45.0;
+  settings.dynamics.x.map = {{'x', {0.0, 200.0}, {45.0, 40.0}},
+                             {'y', {0.0, 200.0}, {45.0, 54.0}},
+                             {'z', {0.0, 100.0}, {45.0, 22.5}}};
+  MachineModel machine(settings, rules_for);
+  const auto rules = machine.at({.height_mm = 50.0, .place_mm = {100.0, 150.0}});
+  const double by_height = 0.75;
+  const double here_hz = 45.0 * by_height * (42.5 / 45.0) * (51.75 / 45.0);
+  EXPECT_NEAR(rules->settings.dynamics.x.freq_hz, here_hz, 1.1e-3 * here_hz);
+  for (const XY place_mm : {XY{0.0, 0.0}, XY{30.0, 170.0}, XY{200.0, 200.0}}) {
+    const double there_hz =
+        45.0 * by_height * (1.0 - place_mm.x / 1800.0) * (1.0 + place_mm.y / 1000.0);
+    const double by_field = rules->settings.dynamics.x.freq_hz * rules->setup.x.field.at(place_mm);
+    const double judged =
+        rules->settings.dynamics.x.freq_hz *
+        rules->verify.change.frequency_shares({place_mm.x, place_mm.y, 50.0, 0.0}).x;
+    EXPECT_NEAR(by_field, there_hz, 6e-4 * there_hz);
+    EXPECT_NEAR(judged, by_field, 1e-9);
+    // The verdict is about the machine as given.
+    EXPECT_NEAR(45.0 * machine.as_given()
+                           .verify.change.frequency_shares({place_mm.x, place_mm.y, 50.0, 0.0})
+                           .x,
+                there_hz, 1e-9);
+  }
+}
+
 TEST(AMachineThatChanges, KeepsWithinATwentiethOfAPercent) {
   machine::Settings settings = flow::testing::settings();
   settings.dynamics.x.moving_mass_g = 800.0;
-  settings.dynamics.x.map = {{"z", {0.0, 250.0}, {settings.dynamics.x.freq_hz, 60.0}}};
+  settings.dynamics.x.map = {{'z', {0.0, 250.0}, {settings.dynamics.x.freq_hz, 60.0}}};
   settings.dynamics.y.moving_mass_g = 300.0;
   MachineModel machine(settings, rules_for);
   for (double printed_g = 0.0; printed_g < 1200.0; printed_g += 23.7) {

@@ -99,8 +99,8 @@ TEST(PathError, IsHowFarTheNozzleIsAcrossThePath) {
   const std::vector<planner::PlannedMove> across = move_at(50.0, true, gcode::Y);
   const dynamics::BaseTrajectory base = base_at(50.0);
   const dynamics::NozzleXY rest;
-  EXPECT_EQ(path_error({along, 0.0, base, rest}, model()).max_mm, 0.0);
-  const PathError error = path_error({across, 0.0, base, rest}, model());
+  EXPECT_EQ(path_error({along, 0.0, base, rest}, model(), {}).max_mm, 0.0);
+  const PathError error = path_error({across, 0.0, base, rest}, model(), {});
   EXPECT_EQ(error.samples, kNodes - 1);
   const double last_mm =
       dynamics::exact_step(model().x, {}, {0.0, 50.0, 0.0}, kPeriod_s * (kNodes - 1)).position();

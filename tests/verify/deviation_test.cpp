@@ -286,6 +286,48 @@ TEST(Measure, CountsFilamentThatIsLaidAfterTheReferenceHasEnded) {
   EXPECT_NEAR(run.all.stats().duration_s, duration_s(reference), 1e-9);
 }
 
+// The nozzle's equation of motion, by RK4 with the frequency of the base's place at each stage.
+TEST(Measure, HasTheFrequencyOfTheBasesPlace) {
+  const auto moves = plan_path({{0.0, 0.0, 0.0}, {100.0, 0.0, 200.0}}, limits_with(5000.0, 5.0));
+  const double omega = 280.0;
+  const double zeta = 0.05;
+  MachineChange change;
+  change.axes.x.maps = {{gcode::X, {0.0, 100.0}, {1.1, 0.7}}};
+  const RunDeviation run = measure(moves, moves, at_rest(moves), model_with(omega, zeta), change);
+  constexpr double kStep_s = 2e-5;
+  const planner::PlannedMove& move = moves.front();
+  double p = 0.0;
+  double v = 0.0;
+  const auto rate = [&](double t, double place, double velocity) {
+    const double b = move.position_mm(t)[gcode::X];
+    const double w = omega * (1.1 - 0.4 * b / 100.0);
+    return 2.0 * zeta * w * (move.velocity_mm_s(t) - velocity) + w * w * (b - place);
+  };
+  const double steps = std::floor(move.duration_s() / kStep_s);
+  const double h = move.duration_s() / steps;
+  double largest_mm = 0.0;
+  for (double i = 0.0; i < steps; i += 1.0) {
+    const double t = i * h;
+    const double v1 = v;
+    const double a1 = rate(t, p, v1);
+    const double v2 = v + 0.5 * h * a1;
+    const double a2 = rate(t + 0.5 * h, p + 0.5 * h * v1, v2);
+    const double v3 = v + 0.5 * h * a2;
+    const double a3 = rate(t + 0.5 * h, p + 0.5 * h * v2, v3);
+    const double v4 = v + h * a3;
+    const double a4 = rate(t + h, p + h * v3, v4);
+    p += h / 6.0 * (v1 + 2.0 * v2 + 2.0 * v3 + v4);
+    v += h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4);
+    largest_mm = std::max(largest_mm, std::abs(p - move.position_mm(t + h)[gcode::X]));
+  }
+  EXPECT_NEAR(run.all.stats().tracking_max_mm, largest_mm, 2e-3 * largest_mm);
+  EXPECT_NEAR(run.end.x.position(), p, 2e-3 * largest_mm);
+  EXPECT_NEAR(run.end.x.velocity(), v, 2e-3 * largest_mm * omega);
+  // Ignoring the map gives another motion.
+  const RunDeviation even = measure(moves, moves, at_rest(moves), model_with(omega, zeta));
+  EXPECT_GT(std::abs(even.end.x.position() - p), 0.1 * largest_mm);
+}
+
 TEST(Measure, CarriesTheNozzleFromOneRunToTheNext) {
   const std::vector<testing::Point> points = {
       {0.0, 0.0, 0.0}, {10.0, 0.0, 100.0, 0.3}, {10.0, 10.0, 100.0, 0.3}, {0.0, 10.0, 80.0, 0.3}};

@@ -590,7 +590,7 @@ TEST(PressureAdvance, IsToBeAsSlicedWhereFilamentIsLaid) {
 
 // 250 g on a bed of 500 g: 38 Hz become 31.03.
 TEST(AMachineThatChanges, SwingsSlowerByTheRootOfItsMass) {
-  const MachineChange change{{{}, {500.0, {}, {}}}, 3e-3};
+  const MachineChange change{{{}, {500.0, {}}}, 3e-3};
   EXPECT_TRUE(change.acts());
   EXPECT_DOUBLE_EQ(change.frequency_shares({}).y, 1.0);
   EXPECT_NEAR(38.0 * change.frequency_shares({0.0, 0.0, 0.0, 250.0 / 3e-3}).y, 31.0269, 1e-4);
@@ -599,8 +599,18 @@ TEST(AMachineThatChanges, SwingsSlowerByTheRootOfItsMass) {
   EXPECT_FALSE(MachineChange{}.acts());
 }
 
+TEST(AMachineThatChanges, MultipliesItsMapsAlongEachDirection) {
+  MachineChange change;
+  change.axes.y.maps = {{gcode::X, {0.0, 100.0}, {1.0, 0.8}}, {gcode::Y, {0.0, 100.0}, {1.0, 1.5}}};
+  EXPECT_TRUE(change.acts_over_bed());
+  EXPECT_NEAR(change.frequency_shares({50.0, 100.0, 3.0, 0.0}).y, 0.9 * 1.5, 1e-15);
+  EXPECT_EQ(change.frequency_shares({50.0, 100.0, 3.0, 0.0}).x, 1.0);
+  change.axes.y.maps = {{gcode::Z, {0.0, 100.0}, {1.0, 0.8}}};
+  EXPECT_FALSE(change.acts_over_bed());
+}
+
 TEST(AMachineThatChanges, FollowsItsHeightsFromPointToPoint) {
-  const MachineChange change{{{0.0, {10.0, 20.0, 60.0}, {1.0, 0.9, 0.5}}, {}}, 0.0};
+  const MachineChange change{{{0.0, {{gcode::Z, {10.0, 20.0, 60.0}, {1.0, 0.9, 0.5}}}}, {}}, 0.0};
   EXPECT_TRUE(change.acts());
   const auto share = [&](double z_mm) { return change.frequency_shares({0.0, 0.0, z_mm, 0.0}).x; };
   EXPECT_DOUBLE_EQ(share(0.0), 1.0);

@@ -26,18 +26,24 @@ struct PlantSettings {
   std::vector<ModeSettings> modes;
 };
 
-// The frequency of an axis at some heights of the nozzle. Between two points it is linear, and
+// The frequency of an axis at some places of the nozzle. Between two points it is linear, and
 // beyond the first and the last one constant.
 struct FrequencyMap {
-  std::string along = "z";
+  char along = 'z';             // 'x', 'y' or 'z'
   std::vector<double> at_mm;    // increasing
   std::vector<double> freq_hz;  // one for each of at_mm
+
+  // place_mm: along the map's direction.
+  [[nodiscard]] double hz_at(double place_mm) const;
+  // Whether the frequency changes while the nozzle moves in X or Y.
+  [[nodiscard]] bool is_over_bed() const { return along != 'z'; }
 };
 
 // All that an axis' frequencies may depend on while a print goes on.
 struct MachineState {
-  double printed_g = 0.0;  // lies on the bed
-  double height_mm = 0.0;  // of the nozzle
+  double printed_g = 0.0;      // lies on the bed
+  double height_mm = 0.0;      // of the nozzle
+  Axes<double> place_mm = {};  // of the nozzle over the bed
 };
 
 // A printer file gives either freq_hz and damping_ratio, or mass_g, stiffness_n_mm and
@@ -53,8 +59,11 @@ struct AxisDynamics {
   double moving_mass_g = 0.0;
   std::vector<FrequencyMap> map = {};  // at most one for each direction
 
-  // The frequency in this state, relative to freq_hz.
+  // The frequency in this state, relative to freq_hz: the product of what mass, height and place
+  // make of it.
   [[nodiscard]] double frequency_share(const MachineState& state) const;
+  // What the place alone makes of it.
+  [[nodiscard]] double share_at(const Axes<double>& place_mm) const;
   [[nodiscard]] bool changes() const { return moving_mass_g > 0.0 || !map.empty(); }
   [[nodiscard]] double slowest_hz() const;
   [[nodiscard]] double fastest_hz() const;

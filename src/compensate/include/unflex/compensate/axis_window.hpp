@@ -53,6 +53,9 @@ struct AxisWindow {
   // r and w at the nodes and in the middles between them: 2n − 1 values for n nodes, n ≥ 2.
   std::vector<double> reference_mm;
   std::vector<double> weight;
+  // The frequencies of all models relative to those given, at the places of r. Empty: 1. Damping
+  // ratios stay.
+  std::vector<double> freq_shares;
   // a of each model, at the places of r. Empty: r for all.
   std::vector<std::vector<double>> aims_mm;
   // ρ/h⁶: without dimension, so that one value serves all periods.

@@ -16,6 +16,7 @@
 #include "unflex/core/axes.hpp"
 #include "unflex/core/error.hpp"
 #include "unflex/dynamics/base_trajectory.hpp"
+#include "unflex/dynamics/frequency_field.hpp"
 #include "unflex/dynamics/shapers.hpp"
 #include "unflex/planner/planner.hpp"
 
@@ -24,6 +25,8 @@ namespace unflex::compensate {
 struct AxisSetup {
   dynamics::FlexibleAxis axis;
   std::vector<Plant> plants;  // as in AxisWindow
+  // How the frequencies of all models change over the bed.
+  dynamics::FrequencyField field;
   // Position limits may be widened per run to where the sliced path itself goes.
   BaseLimits limits;
   dynamics::ShaperPulses pulses;  // of the second stage (second_stage.hpp); empty: there is none
@@ -68,6 +71,10 @@ struct Setup : Axes<AxisSetup> {
     return any_axis([](const AxisSetup& axis) { return !axis.plants.empty(); }, *this);
   }
 };
+
+[[nodiscard]] inline dynamics::FieldXY field_of(const Axes<AxisSetup>& setup) {
+  return map_axes([](const AxisSetup& axis) { return axis.field; }, setup);
+}
 
 // The motion that the nozzle shall follow: the plan of a run, or of a part of a run.
 struct Course {

@@ -39,6 +39,9 @@ struct BaseTrajectory : Axes<AxisTrajectory> {
 
   [[nodiscard]] std::size_t nodes() const { return x.position_mm.size(); }
   [[nodiscard]] double duration_s() const { return static_cast<double>(nodes() - 1) * period_s; }
+  [[nodiscard]] XY node_mm(std::size_t k) const {
+    return map_axes([&](const AxisTrajectory& axis) { return axis.position_mm[k]; }, *this);
+  }
   // t is clamped to [0, duration_s()].
   [[nodiscard]] Axes<AxisMotion> at(double t) const {
     return map_axes([&](const AxisTrajectory& axis) { return at(axis, t); }, *this);

@@ -6,6 +6,7 @@
 
 #include "unflex/core/kinematics.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
+#include "unflex/dynamics/frequency_field.hpp"
 
 namespace unflex::emit {
 
@@ -17,6 +18,9 @@ struct Reach {
 
 struct LineRules {
   Axes<dynamics::FlexibleAxis> nozzle;  // what hangs on the base
+  // How its frequencies change over the bed. It counts where filament is laid. Lines differ so
+  // little from the base that the frequencies given serve all of a run.
+  dynamics::FieldXY field;
   // The frequencies may be off by this share, up and down. Lines between whole steps are chosen to
   // suit nozzles that are off by it. 0: the frequencies are exact.
   double freq_error = 0.0;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "unflex/dynamics/flexible_axis.hpp"
+#include "unflex/dynamics/frequency_field.hpp"
 #include "unflex/dynamics/hotend_pressure.hpp"
 #include "unflex/gcode/interpreter.hpp"
 #include "unflex/machine/machine.hpp"
@@ -23,8 +24,18 @@ inline constexpr double kGrid_mm = 1e-4;
 // The grid on which lines end, mm: that one, or steps.
 [[nodiscard]] double grid_mm(const Settings& settings);
 
-// The settings with all frequencies of an axis this many times as high, and constant.
-[[nodiscard]] Settings with_frequencies(Settings settings, const Axes<double>& shares);
+// What mass, height and place make of an axis' frequencies, as factors.
+struct FrequencyShare {
+  double by_print = 1.0;  // mass and height
+  double by_place = 1.0;
+};
+
+// The settings of a machine on whose bed a mass lies, and whose nozzle is near a place. Frequencies
+// are those there. They still depend on the place, and no longer on mass and height.
+[[nodiscard]] Settings with_frequencies(Settings settings, const Axes<FrequencyShare>& shares);
+
+// How the axis' frequencies depend on the place, as shares of the axis' own.
+[[nodiscard]] dynamics::FrequencyField frequency_field(const AxisDynamics& dynamics);
 
 [[nodiscard]] dynamics::FlexibleAxis flexible_axis(const std::vector<ModeSettings>& settings);
 [[nodiscard]] dynamics::FlexibleAxis flexible_axis(const AxisDynamics& dynamics);

@@ -1,5 +1,5 @@
 // The machine as it is while a run is printed: its frequencies may fall while the print grows, or
-// change with the height.
+// change with height and place.
 #pragma once
 
 #include <cstdint>
@@ -28,7 +28,14 @@ class MachineModel {
   std::function<RunRules(const machine::Settings&)> rules_for_;
   std::shared_ptr<const RunRules> given_;
   std::shared_ptr<const RunRules> present_;
-  Axes<std::int64_t> steps_{0, 0};  // of present_
+  // Frequencies in steps, as FrequencyShare.
+  struct Steps {
+    std::int64_t by_print = 0;
+    std::int64_t by_place = 0;
+
+    bool operator==(const Steps&) const = default;
+  };
+  Axes<Steps> steps_;  // of present_
 };
 
 }  // namespace unflex::run

@@ -7,6 +7,7 @@
 
 #include "unflex/dynamics/base_trajectory.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
+#include "unflex/dynamics/frequency_field.hpp"
 #include "unflex/dynamics/node_map.hpp"
 #include "unflex/planner/planner.hpp"
 #include "unflex/planner/printer_shaper.hpp"
@@ -29,25 +30,29 @@ void advance(const planner::PlannedMove& move, double from_s, double to_s,
 // Takes the nozzle from node to node of the base's motion.
 class NozzleOnBase {
  public:
-  // Both must outlive it.
-  NozzleOnBase(const dynamics::BaseTrajectory& base, const verify::NozzleModel& model)
+  // The base must outlive it.
+  NozzleOnBase(const dynamics::BaseTrajectory& base, const verify::NozzleModel& model,
+               const dynamics::FieldXY& field)
       : base_(&base),
         maps_(map_axes(
-            [&](const dynamics::FlexibleAxis& axis) {
-              return dynamics::NodeMap(axis, base.period_s);
+            [&](const dynamics::FlexibleAxis& axis, const dynamics::FrequencyField& of_axis) {
+              return Maps(axis, of_axis, base.period_s);
             },
-            model)) {}
+            model, field)) {}
 
   // From node k to the next.
-  void advance(std::size_t k, dynamics::NozzleXY& nozzle) const {
-    for_each_axis([&](const dynamics::NodeMap& map, const dynamics::AxisTrajectory& base,
-                      dynamics::NozzleState& state) { map.advance(base, k, state); },
+  void advance(std::size_t k, dynamics::NozzleXY& nozzle) {
+    const XY at_mm = base_->node_mm(k);
+    for_each_axis([&](Maps& maps, const dynamics::AxisTrajectory& base,
+                      dynamics::NozzleState& state) { maps.at(at_mm).advance(base, k, state); },
                   maps_, *base_, nozzle);
   }
 
  private:
+  using Maps = dynamics::FieldMaps<dynamics::NodeMap>;
+
   const dynamics::BaseTrajectory* base_;
-  Axes<dynamics::NodeMap> maps_;
+  Axes<Maps> maps_;
 };
 
 // The part of an offset that is across the segment, which moves in X or Y; without sign.

@@ -11,6 +11,7 @@
 
 #include "unflex/dynamics/base_trajectory.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
+#include "unflex/dynamics/frequency_field.hpp"
 #include "unflex/planner/planner.hpp"
 #include "unflex/verify/deviation.hpp"
 
@@ -36,9 +37,10 @@ struct RunOnBase {
 };
 
 // Both are sampled at the nodes of the base's motion.
-[[nodiscard]] PathError path_error(const RunOnBase& run, const verify::NozzleModel& model);
+[[nodiscard]] PathError path_error(const RunOnBase& run, const verify::NozzleModel& model,
+                                   const dynamics::FieldXY& field);
 // Adds a run. replayed: the printer's plan of the written lines, which begins late_s before the
-// base.
+// base. Frequencies are the same everywhere, since the motions are nearly equal.
 void add_emission_error(const RunOnBase& run, const std::vector<planner::PlannedMove>& replayed,
                         double late_s, const verify::NozzleModel& model, PathError& error);
 

@@ -14,6 +14,7 @@
 #include "unflex/dynamics/flexible_axis.hpp"
 #include "unflex/planner/planner.hpp"
 #include "unflex/verify/log_histogram.hpp"
+#include "unflex/verify/machine_change.hpp"
 #include "unflex/verify/measured.hpp"
 
 namespace unflex::verify {
@@ -94,7 +95,7 @@ struct RunDeviation {
 // measured after the base's last move.
 [[nodiscard]] RunDeviation measure(const std::vector<planner::PlannedMove>& reference,
                                    const std::vector<planner::PlannedMove>& base, NozzleXY start,
-                                   const NozzleModel& model, double lead_in_s = 0.0,
-                                   bool goes_on = false);
+                                   const NozzleModel& model, const MachineChange& change = {},
+                                   double lead_in_s = 0.0, bool goes_on = false);
 
 }  // namespace unflex::verify

@@ -16,6 +16,7 @@
 #include "unflex/verify/corners.hpp"
 #include "unflex/verify/deviation.hpp"
 #include "unflex/verify/line_model.hpp"
+#include "unflex/verify/machine_change.hpp"
 #include "unflex/verify/measured.hpp"
 #include "unflex/verify/observer.hpp"
 #include "unflex/verify/step_rates.hpp"
@@ -45,27 +46,6 @@ struct Leeway {
 
 // Where the timing is free, the nozzle may at its worst stray this many times the tolerance.
 inline constexpr double kTimesTolerance = 1.1;
-
-// What changes the frequency f of an axis while a print goes on: a bed that moves along the axis
-// and carries the print, f = f₀ √(m₀ / (m₀ + m)), and the height of the nozzle.
-struct AxisChange {
-  double moving_mass_g = 0.0;      // m₀; 0: the axis does not carry the print
-  std::vector<double> heights_mm;  // increasing; empty: f is the same at all heights
-  std::vector<double> shares;  // f / f₀ there, linear between two heights, constant beyond them
-};
-
-struct MachineChange {
-  Axes<AxisChange> axes;
-  double filament_g_per_mm = 0.0;  // of the print that lies on the bed
-
-  [[nodiscard]] bool acts() const {
-    return any_axis(
-        [](const AxisChange& axis) { return axis.moving_mass_g > 0.0 || !axis.heights_mm.empty(); },
-        axes);
-  }
-  // f / f₀ of each axis where the machine is, and all filament so far has been laid.
-  [[nodiscard]] Axes<double> frequency_shares(const gcode::Position& at) const;
-};
 
 struct Rules {
   gcode::InterpreterOptions interpreter;
