@@ -21,6 +21,7 @@ _unflex_options() {
     hotend)
       echo '-h --help --power --heater --ambient --ku --pu --rule --target --flow --heater-watts' \
            '--printer --set --report -q --quiet' ;;
+    kinematics) echo '-h --help --fit --printer --set -q --quiet' ;;
     printer) echo '-h --help' ;;
     'printer line-test') echo '-h --help -o --output --printer --set -q --quiet' ;;
     'printer macros') echo '-h --help -o --output --printer --set -q --quiet' ;;
@@ -31,7 +32,7 @@ _unflex_options() {
 
 _unflex_commands() {
   case $1 in
-    '') echo 'compensate batch verify inspect filament study identify tune hotend printer' ;;
+    '') echo 'compensate batch verify inspect filament study identify tune hotend kinematics printer' ;;
     printer) echo 'init line-test macros keys' ;;
   esac
 }
@@ -67,7 +68,8 @@ _unflex_value() {
       *:--wave-spacing-mm | *:--speed-mm-s | *:--decay | *:--read | *:--nozzle-temp | \
       *:--bed-temp | *:--accel | *:--keep-rms | *:--power | *:--ambient | *:--ku | *:--pu | \
       *:--target | *:--flow | *:--heater-watts | *:--filament-start-mm) echo 'any' ;;
-    compensate: | verify: | inspect: | filament: | study: | tune:) echo "files $print" ;;
+    *:--fit) echo 'files *.csv' ;;
+    compensate: | verify: | inspect: | filament: | study: | tune: | kinematics:) echo "files $print" ;;
     identify:) echo 'files *.csv' ;;
     hotend:) echo 'files *.@(csv|log|txt)' ;;
   esac

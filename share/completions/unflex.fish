@@ -39,7 +39,7 @@ function __unflex_settings
     string match --all --regex -- '"[^"]+"|true|false' $of_key | string trim --chars '"' | string replace --regex -- '^' $typed[1]=
 end
 
-set -g __unflex_commands compensate batch verify inspect filament study identify tune hotend printer
+set -g __unflex_commands compensate batch verify inspect filament study identify tune hotend kinematics printer
 set -l gcode '(__unflex_files .gcode .gco .g .bgcode .gcode.gz)'
 set -l printer '(__unflex_files .toml .cfg .g .txt)'
 set -l prints compensate verify inspect filament study
@@ -57,6 +57,7 @@ complete -c unflex -n '__unflex_in ""' -a study -d 'Measure all ways to move the
 complete -c unflex -n '__unflex_in ""' -a identify -d 'Find the resonances in records of accelerometers or a ringing tower'
 complete -c unflex -n '__unflex_in ""' -a tune -d 'Find the resonances by printing towers and looking at their walls'
 complete -c unflex -n '__unflex_in ""' -a hotend -d 'Find the gains that hold the temperature, from a log of a heating'
+complete -c unflex -n '__unflex_in ""' -a kinematics -d 'Show what a print asks of the joints, or find how they move'
 complete -c unflex -n '__unflex_in ""' -a printer -d 'Printer files'
 complete -c unflex -n '__unflex_in printer' -a init -d 'Write a printer file from what already describes the printer'
 complete -c unflex -n '__unflex_in printer' -a line-test -d 'Write G-code that shows how many lines per second the printer takes'
@@ -65,7 +66,7 @@ complete -c unflex -n '__unflex_in printer' -a macros -d 'Write macros by which 
 
 complete -c unflex -n "__unflex_in $prints" -a $gcode
 complete -c unflex -n '__unflex_in identify' -a '(__unflex_files .csv)'
-complete -c unflex -n '__unflex_in tune' -a $gcode
+complete -c unflex -n '__unflex_in tune kinematics' -a $gcode
 complete -c unflex -n '__unflex_in hotend' -a '(__unflex_files .csv .log .txt)'
 
 complete -c unflex -n '__unflex_in compensate filament' -s o -l output -x -a $gcode -d 'Where to write, - for stdout'
@@ -124,6 +125,8 @@ complete -c unflex -n '__unflex_in hotend' -l target -x -d 'Where the simulated 
 complete -c unflex -n '__unflex_in hotend' -l flow -x -d 'Filament that melts, mm³/s'
 complete -c unflex -n '__unflex_in hotend' -l heater-watts -x -d 'What the heater gives at full power, W'
 
+complete -c unflex -n '__unflex_in kinematics' -l fit -x -a '(__unflex_files .csv)' -d 'Measured places: qa,qb,qc,x,y,z'
+
 complete -c unflex -n '__unflex_in "printer init"' -l from -x -a $printer -d 'What describes the printer'
 complete -c unflex -n '__unflex_in "printer init"' -l record -x -a '(__unflex_files .csv)' -d 'A record of a resonance; repeatable'
 complete -c unflex -n '__unflex_in "printer init"' -s o -l output -x -a '(__unflex_files .toml)' -d 'Where to write, - for stdout'
@@ -131,9 +134,9 @@ complete -c unflex -n '__unflex_in "printer init"' -s o -l output -x -a '(__unfl
 complete -c unflex -n '__unflex_in "printer line-test"' -s o -l output -x -a $gcode -d 'Where to write, - for stdout'
 complete -c unflex -n '__unflex_in "printer macros"' -s o -l output -x -a '(__unflex_files .cfg)' -d 'Where to write, - for stdout'
 
-complete -c unflex -n "__unflex_in $prints batch identify tune hotend 'printer line-test' 'printer macros'" -l printer -x -a $printer -d 'The printer'
-complete -c unflex -n "__unflex_in $prints batch identify tune hotend 'printer init' 'printer line-test' 'printer macros'" -l set -x -a '(__unflex_settings)' -d 'Override a key of the printer file, KEY=VALUE'
+complete -c unflex -n "__unflex_in $prints batch identify tune hotend kinematics 'printer line-test' 'printer macros'" -l printer -x -a $printer -d 'The printer'
+complete -c unflex -n "__unflex_in $prints batch identify tune hotend kinematics 'printer init' 'printer line-test' 'printer macros'" -l set -x -a '(__unflex_settings)' -d 'Override a key of the printer file, KEY=VALUE'
 complete -c unflex -n '__unflex_in inspect' -l all -d 'List the settings at their default, too'
 complete -c unflex -n '__unflex_in inspect' -l report -x -a '(__unflex_files .json)' -d 'Write a report, - for stdout'
 complete -c unflex -n '__unflex_in compensate verify study identify hotend' -l report -x -a '(__unflex_files .json .html)' -d 'Write a report, - for JSON to stdout'
-complete -c unflex -n "__unflex_in $prints batch identify tune hotend 'printer init' 'printer line-test' 'printer macros'" -s q -l quiet -d 'No summary and no progress bar'
+complete -c unflex -n "__unflex_in $prints batch identify tune hotend kinematics 'printer init' 'printer line-test' 'printer macros'" -s q -l quiet -d 'No summary and no progress bar'

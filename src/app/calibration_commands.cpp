@@ -220,4 +220,18 @@ void add_hotend(CLI::App& program, RunConfig& config) {
   command->callback([&config] { config.command = Command::hotend; });
 }
 
+void add_kinematics(CLI::App& program, RunConfig& config) {
+  CLI::App* const command = program.add_subcommand(
+      "kinematics", "Show what a print asks of the joints, or find how they move from places");
+  command->add_option("IN", config.input, "G-code, - for stdin")->type_name("");
+  command
+      ->add_option("--fit", config.kinematics.points,
+                   "Instead of IN: measured places, with the columns qa,qb,qc,x,y,z in mm")
+      ->type_name("CSV");
+  add_settings(*command, config);
+  command->add_flag("-q,--quiet", config.quiet,
+                    "No summary, of --fit the lines for the printer file alone");
+  command->callback([&config] { config.command = Command::kinematics; });
+}
+
 }  // namespace unflex::app

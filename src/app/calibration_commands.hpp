@@ -10,5 +10,6 @@ namespace unflex::app {
 void add_identify(CLI::App& program, RunConfig& config);
 void add_tune(CLI::App& program, RunConfig& config);
 void add_hotend(CLI::App& program, RunConfig& config);
+void add_kinematics(CLI::App& program, RunConfig& config);
 
 }  // namespace unflex::app

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "batch_shard.hpp"
+#include "kinematics.hpp"
 
 namespace unflex::app {
 namespace {
@@ -275,6 +276,9 @@ Status complete(RunConfig& config) {
     if (Status checked = check_hotend(config); !checked) {
       return checked;
     }
+  }
+  if (config.command == Command::kinematics) {
+    return check_kinematics(config);
   }
   if (config.command == Command::batch) {
     return check_batch(config);

@@ -454,6 +454,7 @@ Result<CommandLine> parse_command_line(const std::vector<std::string>& arguments
   add_identify(program, config);
   add_tune(program, config);
   add_hotend(program, config);
+  add_kinematics(program, config);
   add_study(program, config);
   program.footer(
       "Exit codes: 0 done, 1 usage or configuration, 2 bad input, 3 deviation above\n"

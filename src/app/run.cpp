@@ -14,6 +14,7 @@
 #include "hotend.hpp"
 #include "identify.hpp"
 #include "inspection.hpp"
+#include "kinematics.hpp"
 #include "log.hpp"
 #include "machines.hpp"
 #include "print_run.hpp"
@@ -228,6 +229,8 @@ Result<ExitCode> run_command(const RunConfig& config, Console& console) {
       return run_filament(config, console);
     case Command::hotend:
       return run_hotend(config, console);
+    case Command::kinematics:
+      return run_kinematics(config, console);
     case Command::compensate:
     case Command::verify:
       break;

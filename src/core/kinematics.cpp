@@ -211,9 +211,4 @@ double Motors::gain_of_both() const {
   return gain;
 }
 
-Motors::Row row_of_rail(double tilt_rad, double azimuth_rad, bool leans_back) {
-  const double along_z = math::cos(tilt_rad) / (math::sin(tilt_rad) * math::cos(azimuth_rad));
-  return {1.0, math::sin(azimuth_rad) / math::cos(azimuth_rad), leans_back ? -along_z : along_z};
-}
-
 }  // namespace unflex

@@ -2,18 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
-#include <istream>
 #include <limits>
-#include <memory>
 #include <string_view>
 
-#include "cpu_slots.hpp"
-#include "piece_thread.hpp"
+#include "read_print.hpp"
 #include "step_rates.hpp"
 #include "unflex/compensate/run.hpp"
 #include "unflex/flow/flow.hpp"
-#include "unflex/flow/input_bytes.hpp"
 #include "unflex/gcode/command.hpp"
 #include "unflex/gcode/compensable.hpp"
 #include "unflex/machine/as_printer.hpp"
@@ -22,6 +17,7 @@
 #include "unflex/run/piece_reader.hpp"
 #include "unflex/run/setup.hpp"
 #include "unflex/run/verify_rules.hpp"
+#include "whole_plan.hpp"
 
 namespace unflex::flow {
 namespace {
@@ -69,8 +65,7 @@ class Inspector {
       : result_(&result),
         firmware_(settings.printer.firmware),
         path_(firmware_),
-        planner_(planner::make_planner(machine::planner_limits(settings),
-                                       machine::firmware_config(settings))),
+        plan_(settings),
         steps_(machine::firmware_config(settings), run::step_rules(settings)),
         absolute_e_(!settings.printer.relative_extrusion) {
     result_->min_mm = on_all_axes(std::numeric_limits<double>::infinity());
@@ -94,9 +89,7 @@ class Inspector {
 
   // input_name: for messages.
   void finish(const std::string& input_name) {
-    gcode::Event end;
-    end.kind = gcode::EventKind::barrier;
-    plan(end);
+    plan_.finish([this](const planner::PlannedMove& move) { add_move(move); });
     if (result_->min_mm.x > result_->max_mm.x) {
       result_->min_mm = result_->max_mm = {};
     }
@@ -165,23 +158,8 @@ class Inspector {
     absolute_e_ = command.is('M', 82) || (absolute_e_ && !command.is('M', 83));
   }
 
-  // Plans the whole file as the firmware does. Unlike the plan of the pieces, this plan goes
-  // through lifts without a stop.
   void plan(const gcode::Event& event) {
-    if (event.kind != gcode::EventKind::move) {
-      planner_->apply(event);
-    }
-    for (const gcode::Segment& segment : event.segments) {
-      planner_->add(segment);
-    }
-    if (event.kind == gcode::EventKind::barrier) {
-      planner_->stop();
-    }
-    planned_.clear();
-    planner_->take_played(planned_);
-    for (const planner::PlannedMove& move : planned_) {
-      add_move(move);
-    }
+    plan_.add(event, [this](const planner::PlannedMove& move) { add_move(move); });
   }
 
   void add_move(const planner::PlannedMove& move) {
@@ -213,9 +191,8 @@ class Inspector {
   Inspection* result_;
   Firmware firmware_;
   run::ExtrudedPath path_;
-  std::unique_ptr<planner::Planner> planner_;
+  WholePlan plan_;
   verify::StepGauge steps_;
-  std::vector<planner::PlannedMove> planned_;
   std::string slicers_;
   std::size_t linear_moves_ = 0;
   bool absolute_e_;
@@ -225,34 +202,17 @@ class Inspector {
 }  // namespace
 
 Result<Inspection> inspect(const Job& job, Progress& progress) {
-  const std::unique_ptr<std::istream> input = job.input->read();
-  if (!*input) {
-    return fail(ErrorKind::input, {job.input_name, 0}, "cannot read the file");
-  }
-  const double bytes = input_bytes(job);
   const compensate::Setup setup = run::compensate_setup(job.settings);
   Inspection result;
   Inspector inspector(result, job.settings);
-  CpuSlots slots(2);
-  PieceThread pieces(*input, job.input_name, run::verify_rules(job.settings), slots, [] {});
-  std::deque<std::unique_ptr<run::Piece>> read;
-  for (pieces.exchange(read); !read.empty(); pieces.exchange(read)) {
-    for (const std::unique_ptr<run::Piece>& piece : read) {
-      inspector.add(*piece, setup);
-    }
-    progress.update("reading", share_of_input(static_cast<double>(result.counts.bytes), bytes));
-    if (progress.cancelled()) {
-      return fail(ErrorKind::internal, "cancelled");
-    }
-  }
-  if (pieces.error()) {
-    return tl::unexpected(*pieces.error());
+  Result<std::vector<std::string>> warnings =
+      read_print(job, progress, [&](const run::Piece& piece) { inspector.add(piece, setup); });
+  if (!warnings) {
+    return tl::unexpected(warnings.error());
   }
   add_step_limits(job.settings, result.step_rates);
   inspector.finish(job.input_name);
-  for (const Diagnostic& warning : pieces.warnings()) {
-    result.warnings.push_back(to_string(warning));
-  }
+  result.warnings.insert(result.warnings.end(), warnings->begin(), warnings->end());
   return result;
 }
 

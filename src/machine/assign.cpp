@@ -135,6 +135,17 @@ std::string store(const Value& value, const Key& key, std::optional<Motors::Row>
   return {};
 }
 
+// Lengths.
+std::string store(const Value& value, const Key& key, std::optional<Pair>& target) {
+  const auto numbers = numbers_of(value);
+  const auto is_length = [](double number) { return number > 0.0; };
+  if (!numbers || numbers->size() != 2 || !std::ranges::all_of(*numbers, is_length)) {
+    return fmt::format("{} must be two numbers > 0, as in [150, 150]", key.name);
+  }
+  target = Pair{numbers->front(), numbers->back()};
+  return {};
+}
+
 std::string store(const Value& value, const Key& key, std::optional<Range>& target) {
   const auto* list = std::get_if<std::vector<Value>>(&value.content);
   const auto is_number = [](const Value& element) {

@@ -28,8 +28,9 @@ using Member =
     std::variant<double& (*)(Draft&), std::optional<double>& (*)(Draft&), bool& (*)(Draft&),
                  std::optional<bool>& (*)(Draft&), Firmware& (*)(Draft&), Kinematics& (*)(Draft&),
                  std::optional<Range>& (*)(Draft&), std::optional<Motors::Row>& (*)(Draft&),
-                 std::string& (*)(Draft&), std::vector<ModeSettings>& (*)(Draft&),
-                 std::vector<PlantSettings>& (*)(Draft&), std::vector<FrequencyMap>& (*)(Draft&)>;
+                 std::optional<Pair>& (*)(Draft&), std::string& (*)(Draft&),
+                 std::vector<ModeSettings>& (*)(Draft&), std::vector<PlantSettings>& (*)(Draft&),
+                 std::vector<FrequencyMap>& (*)(Draft&)>;
 
 struct Key {
   std::string_view name;

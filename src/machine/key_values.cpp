@@ -63,6 +63,8 @@ std::string to_toml_value(const Motors::Row& value) {
   return fmt::format("[{}]", fmt::join(value, ", "));
 }
 
+std::string to_toml_value(const Pair& value) { return fmt::format("[{}]", fmt::join(value, ", ")); }
+
 std::string to_toml_value(const std::vector<ModeSettings>& value) {
   std::string text;
   for (const ModeSettings& mode : value) {
@@ -124,6 +126,9 @@ std::string range_text(const Key& key) {
   }
   if (std::holds_alternative<std::optional<Motors::Row>& (*)(Draft&)>(key.member)) {
     return "three numbers";
+  }
+  if (std::holds_alternative<std::optional<Pair>& (*)(Draft&)>(key.member)) {
+    return "two numbers > 0";
   }
   if (std::holds_alternative<std::vector<ModeSettings>& (*)(Draft&)>(key.member)) {
     return "2 or 3 modes";

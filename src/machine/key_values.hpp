@@ -16,6 +16,7 @@ namespace unflex::machine {
 [[nodiscard]] std::string to_toml_value(const std::string& value);
 [[nodiscard]] std::string to_toml_value(const Range& value);
 [[nodiscard]] std::string to_toml_value(const Motors::Row& value);
+[[nodiscard]] std::string to_toml_value(const Pair& value);
 [[nodiscard]] std::string to_toml_value(const std::vector<ModeSettings>& value);
 [[nodiscard]] std::string to_toml_value(const std::vector<PlantSettings>& value);
 [[nodiscard]] std::string to_toml_value(const std::vector<FrequencyMap>& value);

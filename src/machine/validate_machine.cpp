@@ -1,6 +1,7 @@
 // Checks of motors, and of what changes an axis' frequencies.
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <string>
@@ -89,12 +90,69 @@ Status check_joints(const Draft& draft) {
                : Status{};
 }
 
+// Checks that the legs of a tripteron are told as a whole, and of a tripteron alone.
+Status check_legs(const Draft& draft) {
+  constexpr std::array<std::string_view, 6> kLegs = {
+      "kinematics.bars_mm",         "kinematics.rail_y_mm",       "kinematics.rail_z_mm",
+      "kinematics.tool_joint_a_mm", "kinematics.tool_joint_b_mm", "kinematics.tool_joint_c_mm"};
+  const KinematicsSettings& k = draft.settings.kinematics;
+  const std::array<bool, kLegs.size()> given = {
+      k.bars_mm.has_value(),          k.rail_y_mm.has_value(),
+      k.rail_z_mm.has_value(),        k.tool_joint_mm[0].has_value(),
+      k.tool_joint_mm[1].has_value(), k.tool_joint_mm[2].has_value()};
+  const auto first_given = std::ranges::find(given, true);
+  if (first_given == given.end()) {
+    return k.elbow_deg ? Status(conflict(draft, {"kinematics.elbow_deg"},
+                                         "kinematics.elbow_deg is of the legs' bars; give "
+                                         "kinematics.bars_mm too"))
+                       : Status{};
+  }
+  const std::string_view told = kLegs[static_cast<std::size_t>(first_given - given.begin())];
+  if (k.type != Kinematics::tripteron) {
+    return conflict(draft, {told, "kinematics.type"},
+                    fmt::format("{} is given, but kinematics.type is \"{}\", which has no such "
+                                "legs; take one of them away, or make the type \"tripteron\"",
+                                told, to_string(k.type)));
+  }
+  const auto missing = std::ranges::find(given, false);
+  if (missing != given.end()) {
+    return conflict(draft, {told},
+                    fmt::format("{} is given, but {} is not; the reach of the legs takes both",
+                                told, kLegs[static_cast<std::size_t>(missing - given.begin())]));
+  }
+  return {};
+}
+
+// Checks the elbows' angles, and that the rails run along X, as the legs' planes need it.
+Status check_reach(const Draft& draft) {
+  const KinematicsSettings& k = draft.settings.kinematics;
+  if (k.elbow_deg && (k.elbow_deg->min < 0.0 || k.elbow_deg->max > 180.0)) {
+    return conflict(
+        draft, {"kinematics.elbow_deg"},
+        fmt::format("kinematics.elbow_deg is [{}, {}], and must be within 0, a straight "
+                    "leg, and 180, a folded one",
+                    k.elbow_deg->min, k.elbow_deg->max));
+  }
+  for (std::size_t i = 0; i < kJoints.size(); ++i) {
+    if (k.bars_mm && k.joints[i] && (*k.joints[i])[0] == 0.0) {
+      return conflict(draft, {kJoints[i]},
+                      fmt::format("{} does not move its slider along X with the tool, which a leg "
+                                  "in a plane would; correct its first number, or leave out "
+                                  "kinematics.bars_mm",
+                                  kJoints[i]));
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
 Status check_machine(const Draft& draft) {
-  return check_kinematics(draft).and_then([&] { return check_joints(draft); }).and_then([&] {
-    return check_maps(draft);
-  });
+  return check_kinematics(draft)
+      .and_then([&] { return check_joints(draft); })
+      .and_then([&] { return check_legs(draft); })
+      .and_then([&] { return check_reach(draft); })
+      .and_then([&] { return check_maps(draft); });
 }
 
 }  // namespace unflex::machine

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <random>
 
 namespace unflex {
@@ -61,38 +60,9 @@ TEST(MotorsOf, AnyMachineTellWhereItIs) {
   }
 }
 
-constexpr double kDegree = std::numbers::pi / 180.0;
-
 void expect_row(const Motors::Row& row, const Motors::Row& expected) {
   for (std::size_t axis = 0; axis < row.size(); ++axis) {
     EXPECT_NEAR(row[axis], expected[axis], 1e-6) << "axis " << axis;
-  }
-}
-
-// A leg's plane is n·(T − S) = 0, so a tool at T needs its slider where the plane meets the rail.
-TEST(ARail, GivesTheRowOfItsPlane) {
-  expect_row(row_of_rail(45.0 * kDegree, 0.0, true), {1.0, 0.0, -1.0});
-  expect_row(row_of_rail(45.0 * kDegree, 45.0 * kDegree, true), {1.0, 1.0, -1.41421356});
-  expect_row(row_of_rail(45.0 * kDegree, 30.0 * kDegree, true), {1.0, 0.57735027, -1.15470054});
-  const double diagonal = 54.735610317245346 * kDegree;
-  expect_row(row_of_rail(diagonal, 45.0 * kDegree, true), {1.0, 1.0, -1.0});
-  expect_row(row_of_rail(45.0 * kDegree, 0.0, false), {1.0, 0.0, 1.0});
-}
-
-TEST(ARail, HasItsSliderInThePlaneOfTheLeg) {
-  std::mt19937_64 random(3);
-  std::uniform_real_distribution<double> place(-100.0, 100.0);
-  std::uniform_real_distribution<double> unit(0.05, 0.95);
-  for (int i = 0; i < 200; ++i) {
-    const double tilt = unit(random) * std::numbers::pi / 2.0;
-    const double azimuth = (2.0 * unit(random) - 1.0) * 0.45 * std::numbers::pi;
-    const Motors::Row row = row_of_rail(tilt, azimuth, true);
-    const double n[3] = {std::sin(tilt) * std::cos(azimuth), std::sin(tilt) * std::sin(azimuth),
-                         -std::cos(tilt)};
-    const double tool[3] = {place(random), place(random), place(random)};
-    // The rail passes through the origin.
-    const double slider = row[0] * tool[0] + row[1] * tool[1] + row[2] * tool[2];
-    EXPECT_NEAR(n[0] * (tool[0] - slider) + n[1] * tool[1] + n[2] * tool[2], 0.0, 1e-10);
   }
 }
 

@@ -61,25 +61,12 @@ TEST(ConfigurationPage, ShowsAnExampleThatIsValid) {
 }
 
 TEST(Keys, AreUniqueAndCarryTheirUnit) {
-  const std::map<std::string, std::string> suffixes = {{"mm", "_mm"},
-                                                       {"mm/s", "_mm_s"},
-                                                       {"mm/s²", "_mm_s2"},
-                                                       {"mm/s³", "_mm_s3"},
-                                                       {"mm²", "_mm2"},
-                                                       {"Hz", "_hz"},
-                                                       {"g", "_g"},
-                                                       {"N/mm", "_n_mm"},
-                                                       {"N·s/mm", "_n_s_mm"},
-                                                       {"s", "_s"},
-                                                       {"ms", "_ms"},
-                                                       {"µm", "_um"},
-                                                       {"mm³/s", "_mm3_s"},
-                                                       {"1/s", "_per_s"},
-                                                       {"1/mm", "_per_mm"},
-                                                       {"°C", "_c"},
-                                                       {"W", "_w"},
-                                                       {"g/cm³", "_g_cm3"},
-                                                       {"", ""}};
+  const std::map<std::string, std::string> suffixes = {
+      {"mm", "_mm"},         {"mm/s", "_mm_s"},   {"mm/s²", "_mm_s2"}, {"mm/s³", "_mm_s3"},
+      {"mm²", "_mm2"},       {"Hz", "_hz"},       {"g", "_g"},         {"N/mm", "_n_mm"},
+      {"N·s/mm", "_n_s_mm"}, {"s", "_s"},         {"ms", "_ms"},       {"µm", "_um"},
+      {"mm³/s", "_mm3_s"},   {"1/s", "_per_s"},   {"1/mm", "_per_mm"}, {"°C", "_c"},
+      {"W", "_w"},           {"g/cm³", "_g_cm3"}, {"°", "_deg"},       {"", ""}};
   std::set<std::string> seen;
   for (const KeyDescription& key : describe_keys()) {
     EXPECT_TRUE(seen.insert(key.name).second) << key.name;

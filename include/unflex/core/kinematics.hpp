@@ -102,13 +102,4 @@ class Motors {
   std::array<std::string_view, kCount> names_{"X", "Y", "Z"};
 };
 
-// The row of a motor whose slider runs on a rail along X and carries a leg of two bars. The joints
-// of the leg have parallel axes, so the bars stay in a plane that travels with the slider: n·(T −
-// S) = 0, with the plane's normal n, the slider S and the leg's end T. The plane is tilted against
-// the horizontal by tilt_rad, in (0, π/2), and its normal is turned against the rail by
-// azimuth_rad, in (−π/2, π/2). leans_back: the slider lies towards −X below the tool.
-//
-//   row = (1, tan ψ, ∓ cot τ / cos ψ)     τ  tilt     ψ  azimuth     −: leans_back
-[[nodiscard]] Motors::Row row_of_rail(double tilt_rad, double azimuth_rad, bool leans_back);
-
 }  // namespace unflex

@@ -29,6 +29,9 @@ struct Range {
   double max = 0.0;
 };
 
+// Two numbers, of which either may be the larger.
+using Pair = std::array<double, 2>;
+
 // One value for each of X Y Z E; unset where none is given.
 using AxisOptions = std::array<std::optional<double>, 4>;
 
@@ -203,6 +206,18 @@ struct KinematicsSettings {
   // Travel of each motor per mm of X, Y and Z. Only for the types "linear", where all must be set,
   // and "tripteron", whose own rows are in force while these are unset.
   std::array<std::optional<Motors::Row>, Motors::kCount> joints;
+  // Where the motors' joints are when the tool is at 0, 0, 0. Unset: as the legs tell, or 0.
+  std::optional<Motors::Row> offset_mm;
+  // Where each motor's joint may be. Unset: not limited.
+  std::array<std::optional<Range>, Motors::kCount> range_mm;
+  // The legs of a tripteron, one number or place for each: docs/kinematics.md. All are set, or none
+  // is, and then the reach of the legs is not known.
+  std::optional<Pair> bars_mm;  // upper, lower
+  std::optional<Motors::Row> rail_y_mm;
+  std::optional<Motors::Row> rail_z_mm;
+  std::array<std::optional<Motors::Row>, Motors::kCount> tool_joint_mm;
+  // Of the legs' elbows, 0 where a leg is straight. Unset: 0 to 180.
+  std::optional<Range> elbow_deg;
 };
 
 // Limits of each motor.

@@ -29,7 +29,8 @@ enum class Command {
   batch,
   tune,
   filament,
-  hotend
+  hotend,
+  kinematics
 };
 
 // Whether the command reads a print and writes another one.
@@ -87,6 +88,11 @@ struct HotendConfig {
   std::optional<double> heater_w;
 };
 
+// The settings of `kinematics`, besides a print (RunConfig::input).
+struct KinematicsConfig {
+  std::string points;  // --fit: a table of measured places; empty: not given
+};
+
 // timing.method, if the command line has it.
 enum class TimingMethod { as_set, scaled, optimal };
 
@@ -128,7 +134,8 @@ struct RunConfig {
   Command command = Command::compensate;
   // compensate, inspect: IN; verify: the file given to --against; printer init: --from; study: IN,
   // empty for the thesis' cases; batch: the folder of the prints; tune: the tower that was printed,
-  // empty for the first; hotend: the log, empty where there is none
+  // empty for the first; hotend: the log, empty where there is none; kinematics: IN, empty with
+  // --fit
   std::string input;
   std::optional<std::string> input_text;  // of an input that is in no file
   // compensate, printer init, printer macros, printer line-test, batch, tune: -o, or the input with
@@ -154,6 +161,7 @@ struct RunConfig {
   IdentifyConfig identify;
   TuneConfig tune;
   HotendConfig hotend;
+  KinematicsConfig kinematics;
   StudyConfig study;
   BatchConfig batch;
 };
