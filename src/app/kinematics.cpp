@@ -71,7 +71,7 @@ Status fits(const RunConfig& config, const flow::PrintInJoints& print, Console& 
   for (const flow::Miss& miss : print.misses) {
     lines.push_back(fmt::format("{}:{}: {}", config.input, miss.line, miss.why));
   }
-  console.lines(lines, lines.size(), "lines that the machine cannot follow");
+  console.lines(lines, print.missed_lines, "lines that the machine cannot follow");
   return fail(ErrorKind::input, {config.input, print.misses.front().line},
               fmt::format("{} where this machine cannot be; place the print elsewhere, or correct "
                           "the keys of kinematics if they are wrong",

@@ -88,9 +88,13 @@ class JointGauge {
     if (!why) {
       return false;
     }
-    const bool is_told = !result_->misses.empty() && result_->misses.back().line == line;
     ++result_->missed_moves;
-    if (!is_told && result_->misses.size() < kMostMisses) {
+    if (line == missed_line_) {
+      return true;
+    }
+    missed_line_ = line;
+    ++result_->missed_lines;
+    if (result_->misses.size() < kMostMisses) {
       result_->misses.push_back(
           {line, fmt::format("the tool cannot be at X{:.6g} Y{:.6g} Z{:.6g}: {}", p[0], p[1], p[2],
                              *why)});
@@ -128,6 +132,7 @@ class JointGauge {
 
   kinematics::Machine machine_;
   PrintInJoints* result_;
+  std::size_t missed_line_ = 0;  // the last of them
 };
 
 }  // namespace

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
 #include <utility>
@@ -82,7 +84,7 @@ inline void expect_derivatives(const Machine& machine, const Box& box) {
     for (std::size_t i = 0; i < 3; ++i) {
       EXPECT_NEAR(speed[i], (after[i] - before[i]) / (2.0 * kStep_s), 1e-3);
       const double difference = (after[i] - 2.0 * now[i] + before[i]) / (kStep_s * kStep_s);
-      EXPECT_NEAR(accel[i], difference, 1e-3 * std::max(1000.0, std::abs(accel[i])) * 1e-2);
+      EXPECT_NEAR(accel[i], difference, 1e-5 * std::max(1000.0, std::abs(accel[i])));
     }
   }
 }

@@ -216,7 +216,7 @@ struct KinematicsSettings {
   std::optional<Motors::Row> rail_y_mm;
   std::optional<Motors::Row> rail_z_mm;
   std::array<std::optional<Motors::Row>, Motors::kCount> tool_joint_mm;
-  // Of the legs' elbows, 0 where a leg is straight. Unset: 0 to 180.
+  // Angles of the legs' elbows, 0 where a leg is straight. Unset: 0 to 180.
   std::optional<Range> elbow_deg;
 };
 

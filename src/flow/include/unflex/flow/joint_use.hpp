@@ -40,8 +40,9 @@ struct PrintInJoints {
   std::size_t unknown_moves = 0;  // that begin at a place that the text does not tell
   double condition = 0.0;         // the largest of J along the print
   std::size_t missed_moves = 0;
-  std::vector<Miss> misses;  // the first of them, at most kMostMisses
-  bool has_reach = false;    // whether the settings limit the joints at all
+  std::size_t missed_lines = 0;  // with such moves; an arc has several
+  std::vector<Miss> misses;      // one for each of these lines, at most kMostMisses
+  bool has_reach = false;        // whether the settings limit the joints at all
   std::vector<std::string> warnings;
 };
 

@@ -9,9 +9,9 @@
 
 namespace unflex::kinematics {
 
-// Of the tool: X, Y, Z in mm, or their velocities or accelerations.
+// X, Y and Z of the tool in mm, or their velocities or accelerations.
 using Point = std::array<double, 3>;
-// Of the joints "A", "B", "C", or whatever the machine calls them: mm, mm/s or mm/s².
+// Three joints, "A", "B", "C" or whatever the machine calls them: mm, mm/s or mm/s².
 using Joints = std::array<double, 3>;
 // Joints by axes, without unit.
 using Matrix = Motors::Rows;
