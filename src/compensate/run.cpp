@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <tuple>
+#include <utility>
 
 #include "contour.hpp"
 #include "limits.hpp"
@@ -109,6 +111,25 @@ void take_field(const dynamics::FrequencyField& field, const Axes<std::vector<do
   for (Plant& plant : window.plants) {
     plant.axis = plant.axis.detuned(mean);
   }
+}
+
+// A place in the coordinates in which the setup's axes are apart.
+XY in_coordinates(const Setup& setup, const XY& place_mm) {
+  return setup.frame ? xy_of(setup.frame->to_modes({place_mm.x, place_mm.y, 0.0})) : place_mm;
+}
+
+// The nozzle at the beginning of a window whose base rests at base_mm. Both are in the coordinates
+// in which the setup's axes are apart.
+dynamics::NozzleXY start_of(const dynamics::NozzleXY& nozzle, const Setup& setup,
+                            const XY& base_mm) {
+  if (!setup.frame) {
+    return nozzle;
+  }
+  dynamics::NozzleXY start;
+  for (std::size_t i = 0; i < XY::kCount; ++i) {
+    start[i].parts[0] = {base_mm[i] + nozzle.x.parts[i].position, nozzle.x.parts[i].velocity};
+  }
+  return start;
 }
 
 // Raises the weights around the end of a run. first_sample: where they begin.
@@ -288,7 +309,7 @@ std::vector<RunWindow> windows(const Course& course, const std::vector<WindowSpa
   for (std::size_t i = first_sample; i <= last_sample; ++i) {
     const Reference::Sample sample = reference.at(0.5 * static_cast<double>(i) * grid.period_s);
     for_each_axis([](std::vector<double>& all, double place) { all.push_back(place); },
-                  reference_mm, sample.place_mm);
+                  reference_mm, in_coordinates(setup, sample.place_mm));
     weight.push_back(sample.weight);
   }
   if (course.after.empty()) {
@@ -317,7 +338,8 @@ std::vector<RunWindow> windows(const Course& course, const std::vector<WindowSpa
                          setup, places_mm),
                      setup.shares_motors,
                      setup.contour,
-                     {}};
+                     {},
+                     setup.frame};
     if (setup.contour) {
       window.path = part_of(path, 2 * span.first, window.x.reference_mm.size(),
                             2.0 * setup.contour->reach_s / grid.period_s);
@@ -327,7 +349,8 @@ std::vector<RunWindow> windows(const Course& course, const std::vector<WindowSpa
           [](AxisWindow& axis, const dynamics::NozzleState& state) {
             axis.start = AxisWindow::Start{state, axis.reference_mm.front()};
           },
-          window, nozzle);
+          window,
+          start_of(nozzle, setup, {window.x.reference_mm.front(), window.y.reference_mm.front()}));
     }
     if (course.after.empty() && span.last == spans.back().last) {
       for_each_axis([](AxisWindow& axis) { axis.end_base_mm = axis.reference_mm.back(); }, window);
@@ -397,9 +420,26 @@ Result<dynamics::BaseTrajectory> solve_all(const Engine& engine,
       solutions[axis].push_back(std::move(solved[axis]->base));
     }
   }
-  return dynamics::BaseTrajectory{
+  dynamics::BaseTrajectory base{
       map_axes([&](const auto& of_axis) { return join(spans, of_axis); }, solutions),
       windows.front().x.period_s};
+  return windows.front().frame ? in_axes(*windows.front().frame, base) : std::move(base);
+}
+
+dynamics::BaseTrajectory in_axes(const dynamics::ModeFrame& frame,
+                                 const dynamics::BaseTrajectory& in_modes) {
+  dynamics::BaseTrajectory base = in_modes;
+  for (const auto member :
+       {&dynamics::AxisTrajectory::position_mm, &dynamics::AxisTrajectory::velocity_mm_s,
+        &dynamics::AxisTrajectory::accel_mm_s2}) {
+    for (std::size_t k = 0; k < base.nodes(); ++k) {
+      double& x = (base.x.*member)[k];
+      double& y = (base.y.*member)[k];
+      std::tie(x, y) = std::apply([](double a, double b, double) { return std::pair(a, b); },
+                                  frame.to_axes({x, y, 0.0}));
+    }
+  }
+  return base;
 }
 
 dynamics::AxisTrajectory join(const std::vector<WindowSpan>& spans,

@@ -31,6 +31,11 @@ auto& mass_form(Draft& draft) {
   return draft.mass[Axis].*Field;
 }
 
+template <std::size_t Motor, auto Field>
+auto& drive_setting(Draft& draft) {
+  return draft.settings.swing.drives[Motor].*Field;
+}
+
 template <double (Settings::*Derived)() const>
 double derived(const Settings& settings) {
   return (settings.*Derived)();
@@ -61,8 +66,10 @@ using W = PressureSettings;
 using H = HotendSettings;
 using D = AxisDynamics;
 using N = SecondSettings;
+using Q = SwingSettings;
 using K = KinematicsSettings;
 using R = DynamicsError;
+using G = DriveSettings;
 using M = MassSpringDamper;
 using B = BaseSettings;
 using O = SolveSettings;

@@ -12,6 +12,7 @@ using namespace key_rows;
 
 constexpr std::array<std::string_view, 4> kPressureShapes = {kLinearPressure, "two_slopes", "tanh",
                                                              "reciprocal"};
+constexpr std::array<std::string_view, 2> kSwinging = {kOfAxes, kOfMasses};
 constexpr std::array<std::string_view, 2> kTimingMethods = {kScaled, kOptimal};
 constexpr std::array<std::string_view, 2> kAheadWhen = {"heating", "both"};
 constexpr std::array<std::string_view, 5> kSecondShapers = {"zv", "mzv", "zvd", "ei", "none"};
@@ -247,6 +248,8 @@ constexpr std::array kOtherKeys = {
         nullptr,
         {},
         true},
+    Key{"dynamics.x.gantry_mass_g", &of_axis<0, &S::swing, &Q::gantry_mass_g>, kNotNegative, "g",
+        "Masses: what moves with the tool along X alone"},
     Key{"dynamics.y.freq_hz", &axis_setting<&S::dynamics, 1, &D::freq_hz>,
         Bounds{.min = 1.0, .max = 1000.0}, "Hz", "Natural frequency of the nozzle along Y"},
     Key{"dynamics.y.damping_ratio", &axis_setting<&S::dynamics, 1, &D::damping_ratio>,
@@ -296,7 +299,39 @@ constexpr std::array kOtherKeys = {
         nullptr,
         {},
         true},
+    Key{"dynamics.y.gantry_mass_g", &of_axis<1, &S::swing, &Q::gantry_mass_g>, kNotNegative, "g",
+        "Masses: what moves with the tool along Y alone"},
 
+    Key{"dynamics.a.carriage_mass_g", &drive_setting<0, &G::carriage_mass_g>, kNotNegative, "g",
+        "Masses: what the first motor moves at its own drive"},
+    Key{"dynamics.a.stiffness_n_mm", &drive_setting<0, &G::stiffness_n_mm>, kPositive, "N/mm",
+        "Masses: stiffness of the first motor's drive", "rigid"},
+    Key{"dynamics.a.damping_n_s_mm", &drive_setting<0, &G::damping_n_s_mm>, kNotNegative, "N·s/mm",
+        "Masses: damping of the first motor's drive"},
+    Key{"dynamics.b.carriage_mass_g", &drive_setting<1, &G::carriage_mass_g>, kNotNegative, "g",
+        "Masses: what the second motor moves at its own drive"},
+    Key{"dynamics.b.stiffness_n_mm", &drive_setting<1, &G::stiffness_n_mm>, kPositive, "N/mm",
+        "Masses: stiffness of the second motor's drive", "rigid"},
+    Key{"dynamics.b.damping_n_s_mm", &drive_setting<1, &G::damping_n_s_mm>, kNotNegative, "N·s/mm",
+        "Masses: damping of the second motor's drive"},
+    Key{"dynamics.c.carriage_mass_g", &drive_setting<2, &G::carriage_mass_g>, kNotNegative, "g",
+        "Masses: what the third motor moves at its own drive"},
+    Key{"dynamics.c.stiffness_n_mm", &drive_setting<2, &G::stiffness_n_mm>, kPositive, "N/mm",
+        "Masses: stiffness of the third motor's drive", "rigid"},
+    Key{"dynamics.c.damping_n_s_mm", &drive_setting<2, &G::damping_n_s_mm>, kNotNegative, "N·s/mm",
+        "Masses: damping of the third motor's drive"},
+
+    Key{"dynamics.of",
+        &setting<&S::swing, &Q::of>,
+        kAny,
+        "",
+        "What swings: each axis by itself, or masses on the drives of all motors, whose modes need "
+        "not lie along the axes",
+        {},
+        nullptr,
+        kSwinging},
+    Key{"dynamics.tool_mass_g", &setting<&S::swing, &Q::tool_mass_g>, kPositive, "g",
+        "Masses: what moves along all axes", kNotKnown},
     Key{"dynamics.freq_error", &setting<&S::dynamics_error, &R::freq>,
         Bounds{.min = 0.0, .max = 0.5}, "",
         "How far both frequencies may be off, either way, as a share; the base suits them all. 0: "

@@ -308,7 +308,8 @@ Status read_sources(const Sources& sources, Draft& draft) {
 }
 
 Result<Settings> finish(Draft draft) {
-  if (Status resolved = resolve_dynamics(draft); !resolved) {
+  if (Status resolved = resolve_dynamics(draft).and_then([&] { return resolve_masses(draft); });
+      !resolved) {
     return tl::unexpected(resolved.error());
   }
   if (Status checked = check_consistency(draft); !checked) {
@@ -408,6 +409,9 @@ std::string to_toml(const Settings& settings) {
                                    ? settings.origins[next_origin].second
                                    : std::string{};
     ++next_origin;
+    if (settings.swing.has_masses() && is_of_axes(key.name)) {
+      continue;
+    }
     text += toml_line(key, key.name.substr(section.size() + 1), origin, draft);
   }
   return text;

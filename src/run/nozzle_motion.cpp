@@ -19,6 +19,11 @@ dynamics::NozzleState swing(const dynamics::FlexibleAxis& axis,
 
 dynamics::NozzleXY swing(const verify::NozzleModel& model, const dynamics::NozzleXY& deviation,
                          double duration_s) {
+  if (model.frame) {
+    dynamics::NozzleXY later = deviation;
+    model.frame->advance({}, {}, duration_s, later);
+    return later;
+  }
   return map_axes(
       [&](const dynamics::FlexibleAxis& axis, const dynamics::NozzleState& of_axis) {
         return swing(axis, of_axis, duration_s);
@@ -29,12 +34,11 @@ dynamics::NozzleXY swing(const verify::NozzleModel& model, const dynamics::Nozzl
 }  // namespace
 
 dynamics::NozzleXY at_rest(const gcode::Position& position, const verify::NozzleModel& model) {
-  return dynamics::riding(model, xy_of(position));
+  return verify::riding(model, xy_of(position));
 }
 
 dynamics::NozzleXY at_end_of(const planner::PlannedMove& move, const verify::NozzleModel& model) {
-  return dynamics::riding(model, xy_of(move.segment.end_mm),
-                          move.end_v_mm_s * xy_of(move.direction));
+  return verify::riding(model, xy_of(move.segment.end_mm), move.end_v_mm_s * xy_of(move.direction));
 }
 
 // Goes phase by phase, since the acceleration changes between phases.
@@ -49,6 +53,16 @@ void advance(const planner::PlannedMove& move, double from_s, double to_s,
       continue;
     }
     const double v = move.velocity_mm_s(t);
+    if (model.frame) {
+      const double moves = move.kinematic ? 1.0 : 0.0;
+      const auto along = [&](double size) {
+        return dynamics::ModeFrame::Vector{size * move.direction[0], size * move.direction[1],
+                                           size * move.direction[2]};
+      };
+      model.frame->advance(along(moves * v), along(moves * phase.accel_mm_s2), until_s - t, nozzle);
+      t = until_s;
+      continue;
+    }
     nozzle = map_axes(
         [&](const dynamics::FlexibleAxis& axis, const dynamics::NozzleState& state, double place_mm,
             double ratio) {
@@ -58,6 +72,28 @@ void advance(const planner::PlannedMove& move, double from_s, double to_s,
         model, nozzle, xy_of(move.position_mm(t)), move.kinematic ? xy_of(move.direction) : XY{});
     t = until_s;
   }
+}
+
+// The base's acceleration is linear between nodes. Its mean over a quarter of the way to the next
+// node serves that quarter.
+XY NozzleOnBase::advance_swing(std::size_t k) {
+  constexpr int kParts = 4;
+  const double h = base_->period_s / kParts;
+  for (int i = 0; i < kParts; ++i) {
+    const auto at = [&](double parts) {
+      return map_axes(
+          [&](const dynamics::AxisTrajectory& axis) {
+            return dynamics::between(axis, k, parts * h, base_->period_s);
+          },
+          *base_);
+    };
+    const Axes<dynamics::AxisMotion> begin = at(i);
+    const Axes<dynamics::AxisMotion> middle = at(i + 0.5);
+    frame_->advance({begin.x.velocity_mm_s, begin.y.velocity_mm_s, 0.0},
+                    {middle.x.accel_mm_s2, middle.y.accel_mm_s2, 0.0}, h, nozzle_);
+  }
+  const auto ahead = frame_->ahead(nozzle_);
+  return base_->node_mm(k + 1) + XY{ahead[0].position, ahead[1].position};
 }
 
 double across_mm(const gcode::Segment& segment, const XY& offset_mm) {
@@ -115,11 +151,14 @@ void NozzleFollower::set(const dynamics::NozzleXY& nozzle, const gcode::Position
 }
 
 void NozzleFollower::pause(double duration_s) {
-  driven_ = map_axes(
-      [&](const dynamics::FlexibleAxis& axis, const dynamics::NozzleState& state, double base_mm) {
-        return dynamics::exact_step(axis, state, {base_mm, 0.0, 0.0}, duration_s);
-      },
-      model_, driven_, base_mm_);
+  driven_ = model_.frame
+                ? swing(model_, driven_, duration_s)
+                : map_axes(
+                      [&](const dynamics::FlexibleAxis& axis, const dynamics::NozzleState& state,
+                          double base_mm) {
+                        return dynamics::exact_step(axis, state, {base_mm, 0.0, 0.0}, duration_s);
+                      },
+                      model_, driven_, base_mm_);
   ringing_ = swing(model_, ringing_, duration_s);
 }
 
@@ -142,9 +181,12 @@ double NozzleFollower::change(const gcode::Shaper& next, const gcode::PressureAd
         [&](std::size_t, double since_s) { return swing(axis, deviation, std::max(0.0, since_s)); },
         swing(axis, ringing, stop_s));
   };
-  const dynamics::NozzleXY rest = dynamics::riding(model_, base_mm_);
+  const dynamics::NozzleXY rest = verify::riding(model_, base_mm_);
+  // A shaper delays X and Y differently, and modes that lie along neither mix them. What still
+  // swings behind a shaper is little, so such a nozzle counts as at rest.
   const dynamics::NozzleXY ringing =
-      map_axes(after_stop, model_, shaping_, driven_, ringing_, rest);
+      model_.frame ? dynamics::NozzleXY{}
+                   : map_axes(after_stop, model_, shaping_, driven_, ringing_, rest);
   present_ = next;
   shaping_ = planner::shaping(config_, next);
   driven_ = rest;

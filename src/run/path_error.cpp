@@ -9,17 +9,25 @@
 namespace unflex::run {
 namespace {
 
+XY nozzle_place_mm(const planner::PlanCursor& base, const verify::NozzleModel& model,
+                   const dynamics::NozzleXY& nozzle) {
+  if (!model.frame) {
+    return dynamics::place_mm(nozzle);
+  }
+  const auto ahead = model.frame->ahead(nozzle);
+  return xy_of(base.position_mm()) + XY{ahead[0].position, ahead[1].position};
+}
+
 // target(t, sliced): where the nozzle should be t after the base has begun; nullopt where that
 // ends.
 template <typename Target>
 void add_error(const RunOnBase& run, const verify::NozzleModel& model,
                const dynamics::FieldXY& field, const Target& target, PathError& error) {
-  dynamics::NozzleXY nozzle = run.start;
-  NozzleOnBase on_base(run.base, model, field);
+  NozzleOnBase on_base(run.base, model, field, run.start);
   planner::PlanCursor sliced(run.plan);
   for (std::size_t k = 0; k + 1 < run.base.nodes(); ++k) {
     const double t = static_cast<double>(k + 1) * run.base.period_s;
-    on_base.advance(k, nozzle);
+    const XY nozzle_mm = on_base.advance(k);
     sliced.to(t - run.lead_in_s);
     if (sliced.at_end()) {
       return;
@@ -30,7 +38,7 @@ void add_error(const RunOnBase& run, const verify::NozzleModel& model,
     }
     const gcode::Segment& segment = sliced.move().segment;
     if (t > run.lead_in_s && segment.extruding()) {
-      error.add(across_mm(segment, dynamics::place_mm(nozzle) - *wanted_mm));
+      error.add(across_mm(segment, nozzle_mm - *wanted_mm));
     }
   }
 }
@@ -73,7 +81,10 @@ void add_emission_error(const RunOnBase& run, const std::vector<planner::Planned
     emitted.to(t + late_s, [&](const planner::PlannedMove& move, double from_s, double to_s) {
       advance(move, from_s, to_s, model, real);
     });
-    return emitted.at_end() ? std::nullopt : std::optional(dynamics::place_mm(real));
+    if (emitted.at_end()) {
+      return std::optional<XY>();
+    }
+    return std::optional(nozzle_place_mm(emitted, model, real));
   };
   add_error(run, model, {}, replay, error);
 }

@@ -50,7 +50,7 @@ dynamics::BaseTrajectory both_stages(const RunJob& job, Axes<dynamics::AxisTraje
 }
 
 // Joins what the solvers have found for each axis.
-Axes<dynamics::AxisTrajectory> joined(RunJob& job) {
+dynamics::BaseTrajectory joined(RunJob& job) {
   Axes<std::vector<dynamics::AxisTrajectory>> solutions;
   for (Axes<AxisResult>& result : job.windows.results) {
     for_each_axis(
@@ -60,8 +60,11 @@ Axes<dynamics::AxisTrajectory> joined(RunJob& job) {
         },
         solutions, result);
   }
-  return map_axes([&](const auto& of_axis) { return compensate::join(job.windows.spans, of_axis); },
-                  solutions);
+  dynamics::BaseTrajectory base{
+      map_axes([&](const auto& of_axis) { return compensate::join(job.windows.spans, of_axis); },
+               solutions),
+      job.grid.period_s};
+  return job.setup.frame ? compensate::in_axes(*job.setup.frame, base) : std::move(base);
 }
 
 // The base optimised for the nominal axes alone.
@@ -169,6 +172,25 @@ emit::Run RunJob::run(double tolerance_share, double limits_share,
   return run;
 }
 
+namespace {
+
+// Axes have the modes by what they show of them, and take the swing as one of their main modes.
+dynamics::NozzleXY as_on_axes(const RunJob& job, const dynamics::ModeFrame& frame) {
+  const auto ahead = frame.ahead(job.nozzle);
+  const XY start_mm = xy_of(job.piece.moves.front().segment.start_mm);
+  dynamics::NozzleXY nozzle;
+  for (std::size_t axis = 0; axis < XY::kCount; ++axis) {
+    const dynamics::FlexibleAxis& of_setup = job.setup[axis].axis;
+    nozzle[axis] = of_setup.riding(start_mm[axis]);
+    const auto main = static_cast<std::size_t>(&of_setup.main() - of_setup.modes().data());
+    nozzle[axis].parts[main].position += ahead[axis].position;
+    nozzle[axis].parts[main].velocity += ahead[axis].velocity;
+  }
+  return nozzle;
+}
+
+}  // namespace
+
 AxisResult axis_result(Result<compensate::AxisSolution> solution) {
   if (!solution) {
     return {{}, 0, solution.error().message};
@@ -177,6 +199,12 @@ AxisResult axis_result(Result<compensate::AxisSolution> solution) {
 }
 
 dynamics::NozzleXY first_stage(const RunJob& job, const verify::NozzleModel& model) {
+  if (job.setup.frame) {
+    return job.nozzle;
+  }
+  if (model.frame) {
+    return as_on_axes(job, *model.frame);
+  }
   return map_axes([](const compensate::AxisSetup& setup, const dynamics::FlexibleAxis& axis,
                      const dynamics::NozzleState& nozzle,
                      double start_mm) { return setup.axis.swinging_as(axis, nozzle, start_mm); },

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
+#include <memory>
 #include <numbers>
 #include <utility>
 
@@ -11,6 +13,7 @@
 #include "unflex/core/math.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
 #include "unflex/machine/as_printer.hpp"
+#include "unflex/machine/mode_frame.hpp"
 #include "unflex/verify/verify.hpp"
 
 namespace unflex::run {
@@ -55,6 +58,37 @@ dynamics::ShaperPulses pulses_of(const machine::Settings& settings, double freq_
   return {};
 }
 
+// How much more than an axis a mode asks of the motors that move it: β₀ and β₁ move X and Y by Φ.
+double times_by_modes(const std::optional<dynamics::ModeFrame>& frame) {
+  double most = 1.0;
+  for (std::size_t mode = 0; frame && mode < XY::kCount; ++mode) {
+    most =
+        std::max(most, std::abs(frame->to_axes()[0][mode]) + std::abs(frame->to_axes()[1][mode]));
+  }
+  return most;
+}
+
+// Sets X and Y of the setup to the modes of a machine whose Z is rigid. Where the base may go is
+// not limited: verification sees to it that it stays within the travel.
+void take_modes(const dynamics::ModeFrame& frame, const machine::Settings& settings,
+                compensate::Setup& setup) {
+  const double times = times_by_modes(frame);
+  for (std::size_t i = 0; i < XY::kCount; ++i) {
+    compensate::AxisSetup& axis = setup[i];
+    axis.axis = dynamics::FlexibleAxis(frame.mode(i)->omega_rad_s, frame.mode(i)->zeta);
+    axis.plants =
+        plants({.freq_hz = axis.axis.main_hz(), .damping_ratio = frame.mode(i)->zeta}, settings);
+    axis.limits.min_position_mm = -std::numeric_limits<double>::infinity();
+    axis.limits.max_position_mm = std::numeric_limits<double>::infinity();
+    axis.limits.max_velocity_mm_s /= times;
+    axis.limits.max_accel_mm_s2 /= times;
+    axis.limits.max_jerk_mm_s3 /= times;
+  }
+  setup.contour.reset();
+  setup.jerk_weight = settings.tracking_jerk_weight();
+  setup.frame = std::make_shared<dynamics::ModeFrame>(frame);
+}
+
 compensate::AxisSetup axis_setup(const machine::AxisDynamics& dynamics,
                                  const std::optional<machine::Range>& travel,
                                  const machine::Settings& settings) {
@@ -86,7 +120,8 @@ constexpr double kSeen_mm = 10e-3;
 // Whether the nozzle still swings from the motion before when the run begins.
 bool begins_swinging(const Piece& run, const dynamics::NozzleXY& nozzle,
                      const machine::Settings& settings) {
-  const verify::NozzleModel model{machine::nozzle_axes(settings)};
+  verify::NozzleModel model{machine::nozzle_axes(settings)};
+  model.frame = machine::mode_frame(settings);
   return run.begins_run() &&
          verify::swing_mm(nozzle, run.moves.front().segment.start_mm, model) >= kSeen_mm;
 }
@@ -170,6 +205,10 @@ compensate::Setup compensate_setup(const machine::Settings& settings) {
                                         .tracking_jerk_weight = settings.tracking_jerk_weight(),
                                         .pairs = compensate::pairs_of(setup)};
   }
+  if (const std::optional<dynamics::ModeFrame> frame = machine::mode_frame(settings);
+      frame && !frame->mode(2)) {
+    take_modes(*frame, settings, setup);
+  }
   return setup;
 }
 
@@ -186,7 +225,8 @@ RunSetup setup_for(const compensate::Setup& setup, const Piece& run,
   result.accel = {planned_base_accel_mm_s2(settings, result.asked_accel_mm_s2, !swings),
                   settings.emit_accel_mm_s2(result.asked_accel_mm_s2)};
   result.accel_by_lines_mm_s2 = accel_by_lines_mm_s2(settings);
-  const double gain = settings.motors().gain_of_xy();
+  const double gain =
+      settings.motors().gain_of_xy() * times_by_modes(machine::mode_frame(settings));
   for_each_axis(
       [&](compensate::AxisSetup& axis) {
         axis.limits.max_accel_mm_s2 = result.accel.base_mm_s2 / gain;
@@ -196,7 +236,7 @@ RunSetup setup_for(const compensate::Setup& setup, const Piece& run,
     const bool above = std::ranges::all_of(run.moves, [&](const planner::PlannedMove& move) {
       return move.segment.start_mm[axis] >= 0.0 && move.segment.end_mm[axis] >= 0.0;
     });
-    if (!settings.printer.travel_mm[axis] && above) {
+    if (!settings.printer.travel_mm[axis] && above && !setup.frame) {
       result.setup[axis].limits.min_position_mm = 0.0;
     }
   }

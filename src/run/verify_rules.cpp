@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "unflex/machine/as_printer.hpp"
+#include "unflex/machine/mode_frame.hpp"
 
 namespace unflex::run {
 namespace {
@@ -62,6 +63,7 @@ verify::Rules verify_rules(const machine::Settings& settings) {
   rules.fixed = machine::firmware_config(settings);
   rules.nozzle = {machine::nozzle_axes(settings), settings.verify.step_ms * 1e-3,
                   settings.verify.hold_s};
+  rules.nozzle.frame = machine::mode_frame(settings);
   rules.plants = nozzles_of_plants(settings, rules.nozzle);
   rules.change = {map_axes(change_of, settings.dynamics), settings.filament_g_per_mm()};
   for_each_axis(

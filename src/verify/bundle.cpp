@@ -6,12 +6,19 @@
 #include <utility>
 
 #include "bundle_kernels.hpp"
+#include "shaped_base.hpp"
 
 namespace unflex::verify {
 namespace {
 
 // A state closer to even motion than this counts as even motion.
 constexpr double kRests_mm = 1e-7;
+// Numbers of a swing: place and rate of each mode.
+constexpr std::size_t kSwing = 2 * dynamics::ModeFrame::kCount;
+
+NozzleXY riding_on(const NozzleModel& model, const dynamics::BaseXY& base) {
+  return riding(model, dynamics::place_mm(base), dynamics::velocity_mm_s(base));
+}
 
 }  // namespace
 
@@ -25,7 +32,7 @@ Bundle::Bundle(std::vector<NozzleModel> models)
   for (const NozzleModel& model : models_) {
     for_each_axis(
         [&](const dynamics::FlexibleAxis& axis) {
-          arrays_.modes = std::max(arrays_.modes, axis.mode_count());
+          arrays_.modes = has_frames() ? 1 : std::max(arrays_.modes, axis.mode_count());
           fastest_rad_s_ = std::max(fastest_rad_s_, axis.fastest_rad_s());
         },
         model);
@@ -35,7 +42,7 @@ Bundle::Bundle(std::vector<NozzleModel> models)
        {&arrays_.stiffness_per_s2, &arrays_.damping_per_s, &arrays_.gain, &arrays_.lead_s}) {
     of_modes->assign(parts, 0.0);
   }
-  arrays_.states.assign(2 * parts, 0.0);
+  arrays_.states.assign(2 * parts + (has_frames() ? kSwing * models_.size() : 0), 0.0);
   for (std::vector<double>& map : arrays_.maps) {
     map.assign(2 * parts, 0.0);
   }
@@ -51,6 +58,9 @@ Bundle::Bundle(std::vector<NozzleModel> models)
 }
 
 void Bundle::take_models() {
+  if (has_frames()) {
+    return;
+  }
   for (std::size_t number = 0; number < models_.size(); ++number) {
     for (const std::size_t axis : {0U, 1U}) {
       const dynamics::FlexibleAxis& of = models_[number][axis];
@@ -84,6 +94,9 @@ void Bundle::set_frequencies(const Axes<double>& shares) {
           fastest_rad_s_ = std::max(fastest_rad_s_, axis.fastest_rad_s());
         },
         model, shares);
+    if (model.frame) {
+      model.frame = model.frame->detuned(shares.x);
+    }
   }
   take_models();
   has_maps_ = false;
@@ -91,10 +104,14 @@ void Bundle::set_frequencies(const Axes<double>& shares) {
 
 void Bundle::keep_first() {
   const NozzleXY first = nozzle();
+  const XY place_mm = dynamics::place_mm(motion(0));
   const Axes<double> shares = shares_;
   *this = Bundle({given_.front()});
   set_frequencies(shares);
   set_nozzle(0, first);
+  if (has_frames()) {
+    shift(place_mm - dynamics::place_mm(motion(0)));
+  }
 }
 
 double Bundle::step_s() const {
@@ -104,6 +121,9 @@ double Bundle::step_s() const {
 }
 
 NozzleXY Bundle::nozzle(std::size_t number) const {
+  if (has_frames()) {
+    return swing(number);
+  }
   NozzleXY nozzle;
   for (std::size_t mode = 0; mode < arrays_.modes; ++mode) {
     for (const std::size_t axis : {0U, 1U}) {
@@ -114,7 +134,11 @@ NozzleXY Bundle::nozzle(std::size_t number) const {
   return nozzle;
 }
 
-void Bundle::set_nozzle(std::size_t number, const NozzleXY& nozzle) {
+void Bundle::set_nozzle(std::size_t number, const NozzleXY& nozzle, const XY& base_mm) {
+  if (has_frames()) {
+    set_swing(number, nozzle, resting_at(base_mm));
+    return;
+  }
   for (std::size_t mode = 0; mode < arrays_.modes; ++mode) {
     for (const std::size_t axis : {0U, 1U}) {
       const std::size_t place = arrays_.place(axis, mode) + number;
@@ -122,6 +146,73 @@ void Bundle::set_nozzle(std::size_t number, const NozzleXY& nozzle) {
       arrays_.states[place] = part.position;
       arrays_.states[arrays_.parts() + place] = part.velocity;
     }
+  }
+}
+
+NozzleXY Bundle::swing(std::size_t number) const {
+  const double* const from = arrays_.states.data() + 2 * arrays_.parts() + kSwing * number;
+  NozzleXY result;
+  for (std::size_t mode = 0; mode < dynamics::ModeFrame::kCount; ++mode) {
+    result.x.parts[mode] = {from[2 * mode], from[2 * mode + 1]};
+  }
+  return result;
+}
+
+void Bundle::set_swing(std::size_t number, const NozzleXY& swing, const dynamics::BaseXY& base) {
+  double* const to = arrays_.states.data() + 2 * arrays_.parts() + kSwing * number;
+  for (std::size_t mode = 0; mode < dynamics::ModeFrame::kCount; ++mode) {
+    to[2 * mode] = swing.x.parts[mode].position;
+    to[2 * mode + 1] = swing.x.parts[mode].velocity;
+  }
+  const auto ahead = models_[number].frame->ahead(swing);
+  for (const std::size_t axis : {0U, 1U}) {
+    const std::size_t place = arrays_.place(axis, 0) + number;
+    arrays_.states[place] = base[axis].position + ahead[axis].position;
+    arrays_.states[arrays_.parts() + place] = ahead[axis].velocity;
+  }
+}
+
+// ẏ = u̇ − β̇ and ü = −2ζω ẏ − ω² y, where β̈ is constant.
+void Bundle::step_swings(const dynamics::BaseXY& base, double h, int rk4_steps) {
+  const double dt = h / rk4_steps;
+  dynamics::BaseXY end = base;
+  for_each_axis(
+      [&](dynamics::BaseSegment& axis) {
+        axis.position += h * (axis.velocity + 0.5 * axis.acceleration * h);
+        axis.velocity += h * axis.acceleration;
+      },
+      end);
+  for (std::size_t number = 0; number < models_.size(); ++number) {
+    const dynamics::ModeFrame& frame = *models_[number].frame;
+    const auto velocity = frame.to_modes({base.x.velocity, base.y.velocity, 0.0});
+    const auto accel = frame.to_modes({base.x.acceleration, base.y.acceleration, 0.0});
+    NozzleXY of_nozzle = swing(number);
+    for (std::size_t i = 0; i < accel.size(); ++i) {
+      if (!frame.mode(i)) {
+        continue;
+      }
+      const double stiffness = frame.mode(i)->stiffness_per_s2();
+      const double damping = frame.mode(i)->damping_per_s();
+      auto& [y, v] = of_nozzle.x.parts[i];
+      for (int step = 0; step < rk4_steps; ++step) {
+        const double base_v = velocity[i] + step * dt * accel[i];
+        const auto slope = [&](double t, double of_v) { return of_v - (base_v + t * accel[i]); };
+        const auto rate = [&](double of_y, double of_slope) {
+          return -damping * of_slope - stiffness * of_y;
+        };
+        const double s1 = slope(0.0, v);
+        const double a1 = rate(y, s1);
+        const double s2 = slope(0.5 * dt, v + 0.5 * dt * a1);
+        const double a2 = rate(y + 0.5 * dt * s1, s2);
+        const double s3 = slope(0.5 * dt, v + 0.5 * dt * a2);
+        const double a3 = rate(y + 0.5 * dt * s2, s3);
+        const double s4 = slope(dt, v + dt * a3);
+        const double a4 = rate(y + dt * s3, s4);
+        y += dt / 6.0 * (s1 + 2.0 * s2 + 2.0 * s3 + s4);
+        v += dt / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4);
+      }
+    }
+    set_swing(number, of_nozzle, end);
   }
 }
 
@@ -148,12 +239,23 @@ void Bundle::change_all(const Change& change, const Axes<Value>& by) {
 }
 
 void Bundle::shift(const XY& by_mm) {
+  if (has_frames()) {
+    for (std::size_t number = 0; number < models_.size(); ++number) {
+      arrays_.states[arrays_.place(0, 0) + number] += by_mm.x;
+      arrays_.states[arrays_.place(1, 0) + number] += by_mm.y;
+    }
+    return;
+  }
   change_all([&](const dynamics::FlexibleAxis& axis, double by,
                  dynamics::NozzleState& nozzle) { nozzle.add(axis.riding(by)); },
              by_mm);
 }
 
 void Bundle::settle(const dynamics::BaseXY& base, double duration_s) {
+  if (has_frames()) {
+    step_swings(base, duration_s, rk4_steps_of(duration_s));
+    return;
+  }
   change_all(
       [&](const dynamics::FlexibleAxis& axis, const dynamics::BaseSegment& of_axis,
           dynamics::NozzleState& nozzle) {
@@ -170,7 +272,9 @@ bool Bundle::rest_on(const dynamics::BaseXY& base) const {
     return std::max(gap.place_mm, gap.speed_mm) < kRests_mm;
   };
   for (std::size_t number = 0; number < models_.size(); ++number) {
-    if (!all_axes(rests, models_[number], nozzle(number), base)) {
+    const NozzleModel& model = models_[number];
+    if (model.frame ? model.frame->apart_mm(swing(number), riding_on(model, base)) >= kRests_mm
+                    : !all_axes(rests, model, nozzle(number), base)) {
       return false;
     }
   }
@@ -178,6 +282,12 @@ bool Bundle::rest_on(const dynamics::BaseXY& base) const {
 }
 
 void Bundle::ride_on(const dynamics::BaseXY& base) {
+  if (has_frames()) {
+    for (std::size_t number = 0; number < models_.size(); ++number) {
+      set_swing(number, riding_on(models_[number], base), base);
+    }
+    return;
+  }
   change_all(
       [](const dynamics::FlexibleAxis& axis, const dynamics::BaseSegment& of_axis,
          dynamics::NozzleState& nozzle) {
@@ -189,18 +299,24 @@ void Bundle::ride_on(const dynamics::BaseXY& base) {
 void Bundle::begin_steps(double steps, double h) {
   // For fewer steps it does not pay to set up maps.
   constexpr double kManySteps = 6.0;
-  // The longest RK4 step as a share of 1/ω. The swing is then wrong by 2e-5 of itself.
-  constexpr double kLongest = 0.3;
   h_ = h;
-  rk4_steps_ = std::max(static_cast<int>(std::ceil(fastest_rad_s_ * h / kLongest)), 1);
-  has_maps_ = steps >= kManySteps;
+  rk4_steps_ = rk4_steps_of(h);
+  has_maps_ = steps >= kManySteps && !has_frames();
   if (has_maps_) {
     kernel_->set_maps(h_, rk4_steps_, arrays_);
   }
 }
 
+int Bundle::rk4_steps_of(double h) const {
+  // The longest RK4 step as a share of 1/ω. The swing is then wrong by 2e-5 of itself.
+  constexpr double kLongest = 0.3;
+  return std::max(static_cast<int>(std::ceil(fastest_rad_s_ * h / kLongest)), 1);
+}
+
 void Bundle::step(const dynamics::BaseXY& base) {
-  if (has_maps_) {
+  if (has_frames()) {
+    step_swings(base, h_, rk4_steps_);
+  } else if (has_maps_) {
     kernel_->step_by_maps(base, arrays_);
   } else {
     kernel_->step(base, h_, rk4_steps_, arrays_);

@@ -38,7 +38,8 @@ class Bundle {
   [[nodiscard]] double step_s() const;
 
   [[nodiscard]] NozzleXY nozzle(std::size_t number = 0) const;
-  void set_nozzle(std::size_t number, const NozzleXY& nozzle);
+  // base_mm: where the base is. It counts where modes do not lie along the axes.
+  void set_nozzle(std::size_t number, const NozzleXY& nozzle, const XY& base_mm = {});
   [[nodiscard]] dynamics::NozzleMotionXY motion(std::size_t number) const;
   // States of all nozzles.
   [[nodiscard]] const std::vector<double>& states() const { return arrays_.states; }
@@ -82,6 +83,14 @@ class Bundle {
 
  private:
   void take_models();
+  [[nodiscard]] int rk4_steps_of(double h) const;
+  // Whether modes do not lie along the axes (dynamics/mode_frame.hpp). The states in arrays_ are
+  // then places and velocities of the nozzles, with the swings y behind them.
+  [[nodiscard]] bool has_frames() const { return models_.front().frame.has_value(); }
+  [[nodiscard]] NozzleXY swing(std::size_t number) const;
+  void set_swing(std::size_t number, const NozzleXY& swing, const dynamics::BaseXY& base);
+  // Moves the swings by rk4_steps steps of RK4 while the base goes on for h seconds.
+  void step_swings(const dynamics::BaseXY& base, double h, int rk4_steps);
   // change(axis, value, nozzle) for each axis of each nozzle.
   template <class Change, class Value>
   void change_all(const Change& change, const Axes<Value>& by);

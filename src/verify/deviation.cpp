@@ -35,7 +35,15 @@ NozzleModel coarse(NozzleModel model) {
   return model;
 }
 
+NozzleXY riding(const NozzleModel& model, const XY& place_mm, const XY& velocity_mm_s) {
+  return model.frame ? model.frame->riding({velocity_mm_s.x, velocity_mm_s.y, 0.0})
+                     : dynamics::riding(model, place_mm, velocity_mm_s);
+}
+
 double apart_mm(const NozzleXY& a, const NozzleXY& b, const NozzleModel& model) {
+  if (model.frame) {
+    return model.frame->apart_mm(a, b);
+  }
   return length(map_axes(
       [](const dynamics::FlexibleAxis& axis, const dynamics::NozzleState& of_a,
          const dynamics::NozzleState& of_b) {
@@ -46,7 +54,7 @@ double apart_mm(const NozzleXY& a, const NozzleXY& b, const NozzleModel& model) 
 }
 
 double swing_mm(const NozzleXY& nozzle, const gcode::Position& at, const NozzleModel& model) {
-  return apart_mm(nozzle, dynamics::riding(model, xy_of(at)), model);
+  return apart_mm(nozzle, riding(model, xy_of(at)), model);
 }
 
 RunError run_error(double contour2_mm2_s, double contour_max_mm, double duration_s, double swing_mm,

@@ -67,7 +67,7 @@ void Meter::follow_line(const LineModel& model) {
 }
 
 void Meter::set_state(const NozzleXY& nozzle, const XY& base_mm) {
-  bundle_.set_nozzle(0, nozzle);
+  bundle_.set_nozzle(0, nozzle, base_mm);
   last_look_.reset();
   base_mm_ = base_mm;
 }

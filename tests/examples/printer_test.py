@@ -24,7 +24,9 @@ NO_DEFAULT = re.compile(r"# (written|max_flow_mm3_s|max_speed_mm_s|outer_wall_to
                         r"dead_time_s|heater_w) = ")
 # For other machines than the example's.
 OTHERS = re.compile(r"# (joint_[abc]|map|offset_mm|range_[abc]_mm|bars_mm|rail_[yz]_mm|tool_joint_[abc]_mm|"
-                    r"elbow_deg) = ")
+                    r"elbow_deg|tool_mass_g) = ")
+# The sections of drives, which stand in for the axes'.
+DRIVES = re.compile(r"# \[dynamics\.[abc]\]")
 MODAL = re.compile(r"(# )?(freq_hz|damping_ratio) = ")
 
 
@@ -34,9 +36,15 @@ def text_of(folder, name):
 
 
 def uncommented(lines):
-    """The lines with each key and section that is a comment put in force."""
-    return [line if OTHERS.match(line) else re.sub(r"^# (?=\[[a-z.]+\]|\w+ = )", "", line)
-            for line in lines]
+    """The lines with each key and section that is a comment put in force, but for drives."""
+    result = []
+    of_drive = False
+    for line in lines:
+        if re.match(r"(# )?\[|$", line):
+            of_drive = DRIVES.match(line) is not None
+        kept = of_drive or OTHERS.match(line)
+        result.append(line if kept else re.sub(r"^# (?=\[[a-z.]+\]|\w+ = )", "", line))
+    return result
 
 
 class PrinterFile(unittest.TestCase):

@@ -87,6 +87,86 @@ TEST(Bundle, StepsAsRungeAndKuttaDo) {
   }
 }
 
+// Modes that lie along no axis. The masses' own equation, by RK4 in X and Y with finer steps:
+// M p̈ = C (ḃ − ṗ) + K (b − p). The base leaps to another velocity halfway.
+TEST(Bundle, MovesNozzlesWhoseModesAreNotTheAxes) {
+  constexpr double kShare_s = 4e-4;
+  dynamics::ModeFrame::Masses masses;
+  masses.mass_kg = {{{0.4, 0.05, 0.0}, {0.05, 0.7, 0.0}, {0.0, 0.0, 1.0}}};
+  masses.stiffness_n_mm = {{{70.0, 10.0, 0.0}, {10.0, 70.0, 0.0}, {0.0, 0.0, 0.0}}};
+  for (std::size_t i = 0; i < 2; ++i) {
+    for (std::size_t j = 0; j < 2; ++j) {
+      masses.damping_n_s_mm[i][j] = kShare_s * masses.stiffness_n_mm[i][j];
+    }
+  }
+  NozzleModel model;
+  model.frame = dynamics::ModeFrame::of(masses).value();
+  model.x = dynamics::from_frequency(70.0, 0.05);
+  model.y = model.x;
+  Bundle bundle({model, model});
+  bundle.shift({100.0, 50.0});
+  std::array<double, 4> state = {100.0, 50.0, 0.0, 0.0};
+  dynamics::BaseXY base{{100.0, 20.0, 3000.0}, {50.0, -30.0, -4000.0}};
+  const auto rate = [&](const std::array<double, 4>& s, double t) {
+    std::array<double, 2> force{};
+    for (std::size_t j = 0; j < 2; ++j) {
+      const dynamics::BaseSegment& b = base[j];
+      const double ahead = b.position + t * (b.velocity + 0.5 * b.acceleration * t) - s[j];
+      const double faster = b.velocity + t * b.acceleration - s[2 + j];
+      for (std::size_t i = 0; i < 2; ++i) {
+        force[i] += 1e3 * masses.stiffness_n_mm[i][j] * (ahead + kShare_s * faster);
+      }
+    }
+    const auto& m = masses.mass_kg;
+    const double determinant = m[0][0] * m[1][1] - m[0][1] * m[1][0];
+    return std::array<double, 4>{s[2], s[3],
+                                 (m[1][1] * force[0] - m[0][1] * force[1]) / determinant,
+                                 (m[0][0] * force[1] - m[1][0] * force[0]) / determinant};
+  };
+  constexpr double kH_s = 5e-4;
+  constexpr int kFiner = 20;
+  for (int step = 0; step < 40; ++step) {
+    if (step == 20) {
+      base.x.velocity -= 15.0;
+    }
+    bundle.begin_steps(1.0, kH_s);
+    bundle.step(base);
+    const double h = kH_s / kFiner;
+    for (int i = 0; i < kFiner; ++i) {
+      const double t = i * h;
+      const auto plus = [&](const std::array<double, 4>& k, double dt) {
+        std::array<double, 4> next = state;
+        for (std::size_t n = 0; n < 4; ++n) {
+          next[n] += dt * k[n];
+        }
+        return next;
+      };
+      const auto k1 = rate(state, t);
+      const auto k2 = rate(plus(k1, 0.5 * h), t + 0.5 * h);
+      const auto k3 = rate(plus(k2, 0.5 * h), t + 0.5 * h);
+      const auto k4 = rate(plus(k3, h), t + h);
+      for (std::size_t n = 0; n < 4; ++n) {
+        state[n] += h / 6.0 * (k1[n] + 2.0 * k2[n] + 2.0 * k3[n] + k4[n]);
+      }
+    }
+    for (dynamics::BaseSegment* axis : {&base.x, &base.y}) {
+      axis->position += kH_s * (axis->velocity + 0.5 * axis->acceleration * kH_s);
+      axis->velocity += kH_s * axis->acceleration;
+    }
+    for (const std::size_t number : {0U, 1U}) {
+      const dynamics::NozzleMotionXY found = bundle.motion(number);
+      ASSERT_NEAR(found.x.position, state[0], 5e-6) << step;
+      ASSERT_NEAR(found.y.position, state[1], 5e-6) << step;
+      ASSERT_NEAR(found.x.velocity, state[2], 3e-3) << step;
+      ASSERT_NEAR(found.y.velocity, state[3], 3e-3) << step;
+    }
+  }
+  EXPECT_FALSE(bundle.rest_on(base));
+  bundle.ride_on(base);
+  EXPECT_TRUE(bundle.rest_on(base));
+  EXPECT_EQ(bundle.motion(1).y.position, base.y.position);
+}
+
 // The states stay, and from then on the nozzles move as those of the slower models.
 TEST(Bundle, GoesOnWithOtherFrequencies) {
   std::mt19937_64 random(12);

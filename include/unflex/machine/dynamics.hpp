@@ -1,9 +1,11 @@
 // How the nozzle swings on each axis, and what changes it while a print goes on.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "unflex/core/axes.hpp"
@@ -72,6 +74,27 @@ struct AxisDynamics {
   [[nodiscard]] double good_period_ms() const;
   // "45 Hz, ζ 0.06", or that of each mode with its gain.
   [[nodiscard]] std::string description() const;
+};
+
+// What a motor drives: a belt or a screw, and the carriage on it.
+struct DriveSettings {
+  double carriage_mass_g = 0.0;
+  std::optional<double> stiffness_n_mm;  // unset: so stiff that it does not swing
+  double damping_n_s_mm = 0.0;
+};
+
+inline constexpr std::string_view kOfAxes = "axes";
+inline constexpr std::string_view kOfMasses = "masses";
+
+// What swings. With masses on the drives of all motors, the modes need not lie along the axes.
+// AxisDynamics then has what each axis shows of them, and is not given.
+struct SwingSettings {
+  std::string of{kOfAxes};  // or kOfMasses
+  std::optional<double> tool_mass_g;
+  Axes<double> gantry_mass_g;           // moves with the tool along that axis alone
+  std::array<DriveSettings, 3> drives;  // of the motors, in the order of Motors
+
+  [[nodiscard]] bool has_masses() const { return of == kOfMasses; }
 };
 
 // The shares by which the axes' frequencies and damping ratios may be off, either way.

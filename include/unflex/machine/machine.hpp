@@ -311,6 +311,7 @@ struct Settings {
   PressureSettings pressure;
   HotendSettings hotend;
   Axes<AxisDynamics> dynamics;
+  SwingSettings swing;
   DynamicsError dynamics_error;
   SecondSettings second;
   KinematicsSettings kinematics;

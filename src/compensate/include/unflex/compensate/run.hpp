@@ -8,6 +8,7 @@
 #include <array>
 #include <cstddef>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -17,6 +18,7 @@
 #include "unflex/core/error.hpp"
 #include "unflex/dynamics/base_trajectory.hpp"
 #include "unflex/dynamics/frequency_field.hpp"
+#include "unflex/dynamics/mode_frame.hpp"
 #include "unflex/dynamics/shapers.hpp"
 #include "unflex/planner/planner.hpp"
 
@@ -65,6 +67,9 @@ struct Setup : Axes<AxisSetup> {
   double end_weight = 0.0;         // least w around the end of a run
   double jerk_weight = 1.5;        // ρ / (h⁶ (ωh)⁴)
   std::optional<Contour> contour;  // unset: the nozzle shall be where r is at the time
+  // The machine's modes, where they do not lie along the axes, and Z is rigid. X and Y are then
+  // modes 0 and 1 (dynamics/mode_frame.hpp), and there is no contour. A nozzle is a swing.
+  std::shared_ptr<const dynamics::ModeFrame> frame;
 
   // Whether the base is to suit more models than the axes as given.
   [[nodiscard]] bool is_robust() const {
@@ -141,6 +146,7 @@ struct RunWindow : Axes<AxisWindow> {
   // Only with a contour: the path of the window and as far around it as its reach.
   std::optional<Contour> contour = {};
   std::vector<PathVertex> path = {};
+  std::shared_ptr<const dynamics::ModeFrame> frame = {};  // as in Setup
 };
 
 // The problems of all windows, on the nodes of node_grid(). nozzle: its position and velocity when
@@ -169,6 +175,10 @@ using AxisSolutions = Axes<Result<AxisSolution>>;
 [[nodiscard]] Result<dynamics::BaseTrajectory> solve_all(
     const Engine& engine, const std::vector<WindowSpan>& spans, std::vector<RunWindow>& windows,
     const std::function<void(const AxisSolution&)>& each = nullptr);
+
+// The base as it moves in X and Y, where it was found in these modes.
+[[nodiscard]] dynamics::BaseTrajectory in_axes(const dynamics::ModeFrame& frame,
+                                               const dynamics::BaseTrajectory& in_modes);
 
 // Makes each axis of a window a problem of its own, as solve() does, for an engine that solves it
 // elsewhere. divider: the engine that solves here what the division into such problems needs.

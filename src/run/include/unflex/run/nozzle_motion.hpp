@@ -30,28 +30,39 @@ void advance(const planner::PlannedMove& move, double from_s, double to_s,
 // Takes the nozzle from node to node of the base's motion.
 class NozzleOnBase {
  public:
-  // The base must outlive it.
+  // The base must outlive it. start: the nozzle at its first node.
   NozzleOnBase(const dynamics::BaseTrajectory& base, const verify::NozzleModel& model,
-               const dynamics::FieldXY& field)
+               const dynamics::FieldXY& field, const dynamics::NozzleXY& start)
       : base_(&base),
+        frame_(model.frame),
+        nozzle_(start),
         maps_(map_axes(
             [&](const dynamics::FlexibleAxis& axis, const dynamics::FrequencyField& of_axis) {
               return Maps(axis, of_axis, base.period_s);
             },
             model, field)) {}
 
-  // From node k to the next.
-  void advance(std::size_t k, dynamics::NozzleXY& nozzle) {
+  // From node k to the next. Returns the nozzle's place there.
+  XY advance(std::size_t k) {
+    if (frame_) {
+      return advance_swing(k);
+    }
     const XY at_mm = base_->node_mm(k);
     for_each_axis([&](Maps& maps, const dynamics::AxisTrajectory& base,
                       dynamics::NozzleState& state) { maps.at(at_mm).advance(base, k, state); },
-                  maps_, *base_, nozzle);
+                  maps_, *base_, nozzle_);
+    return dynamics::place_mm(nozzle_);
   }
 
  private:
   using Maps = dynamics::FieldMaps<dynamics::NodeMap>;
 
+  // Where modes do not lie along the axes.
+  XY advance_swing(std::size_t k);
+
   const dynamics::BaseTrajectory* base_;
+  std::optional<dynamics::ModeFrame> frame_;
+  dynamics::NozzleXY nozzle_;
   Axes<Maps> maps_;
 };
 

@@ -9,9 +9,11 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "unflex/dynamics/flexible_axis.hpp"
+#include "unflex/dynamics/mode_frame.hpp"
 #include "unflex/planner/planner.hpp"
 #include "unflex/verify/log_histogram.hpp"
 #include "unflex/verify/machine_change.hpp"
@@ -55,6 +57,9 @@ struct NozzleModel : Axes<dynamics::FlexibleAxis> {
   // Longest time between two looks. Looks are also taken where acceleration changes.
   double step_s = 5e-4;
   double hold_s = 0.5;  // how long the base is held after the end of the file
+  // Where modes do not lie along the axes, this is what the nozzle hangs on. The axes are then what
+  // each of them shows of the modes.
+  std::optional<dynamics::ModeFrame> frame = {};
 };
 
 // The model with a step just fine enough to compare two motions: 20 steps per period of the faster
@@ -62,6 +67,10 @@ struct NozzleModel : Axes<dynamics::FlexibleAxis> {
 [[nodiscard]] NozzleModel coarse(NozzleModel model);
 
 using dynamics::NozzleXY;
+
+// The nozzle of a base that has long been in even motion.
+[[nodiscard]] NozzleXY riding(const NozzleModel& model, const XY& place_mm,
+                              const XY& velocity_mm_s = {});
 
 // Distance between two nozzle states, in mm. Velocities count divided by ω.
 [[nodiscard]] double apart_mm(const NozzleXY& a, const NozzleXY& b, const NozzleModel& model);
