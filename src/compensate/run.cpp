@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <tuple>
 #include <utility>
 
 #include "contour.hpp"
 #include "limits.hpp"
+#include "mode_motors.hpp"
 #include "shared_motors.hpp"
 #include "unflex/core/math.hpp"
 #include "unflex/planner/plan_times.hpp"
@@ -113,9 +113,16 @@ void take_field(const dynamics::FrequencyField& field, const Axes<std::vector<do
   }
 }
 
-// A place in the coordinates in which the setup's axes are apart.
-XY in_coordinates(const Setup& setup, const XY& place_mm) {
-  return setup.frame ? xy_of(setup.frame->to_modes({place_mm.x, place_mm.y, 0.0})) : place_mm;
+// A place in the coordinates in which the setup's axes are apart. Heights count from the plan's.
+std::array<double, 3> in_coordinates(const Setup& setup, const XY& place_mm) {
+  const std::array<double, 3> place = {place_mm.x, place_mm.y, 0.0};
+  return setup.frame ? setup.frame->to_modes(place) : place;
+}
+
+dynamics::NozzleState start_of_mode(const dynamics::NozzleXY& nozzle, std::size_t mode,
+                                    double base_mm) {
+  const dynamics::NozzleMotion& part = nozzle.x.parts[mode];
+  return {{dynamics::NozzleMotion{base_mm + part.position, part.velocity}}};
 }
 
 // The nozzle at the beginning of a window whose base rests at base_mm. Both are in the coordinates
@@ -127,7 +134,7 @@ dynamics::NozzleXY start_of(const dynamics::NozzleXY& nozzle, const Setup& setup
   }
   dynamics::NozzleXY start;
   for (std::size_t i = 0; i < XY::kCount; ++i) {
-    start[i].parts[0] = {base_mm[i] + nozzle.x.parts[i].position, nozzle.x.parts[i].velocity};
+    start[i] = start_of_mode(nozzle, i, base_mm[i]);
   }
   return start;
 }
@@ -303,13 +310,16 @@ std::vector<RunWindow> windows(const Course& course, const std::vector<WindowSpa
   const std::size_t first_sample = 2 * spans[first].first;
   const std::size_t last_sample = 2 * spans[first + count - 1].last;
   Axes<std::vector<double>> reference_mm;
+  std::vector<double> third_mm;
   std::vector<double> weight;
   const bool from_rest = course.before.empty();
   Reference reference(course, origin_s(course, grid, setup), setup);
   for (std::size_t i = first_sample; i <= last_sample; ++i) {
     const Reference::Sample sample = reference.at(0.5 * static_cast<double>(i) * grid.period_s);
+    const std::array<double, 3> place_mm = in_coordinates(setup, sample.place_mm);
     for_each_axis([](std::vector<double>& all, double place) { all.push_back(place); },
-                  reference_mm, in_coordinates(setup, sample.place_mm));
+                  reference_mm, xy_of(place_mm));
+    third_mm.push_back(place_mm[2]);
     weight.push_back(sample.weight);
   }
   if (course.after.empty()) {
@@ -344,6 +354,10 @@ std::vector<RunWindow> windows(const Course& course, const std::vector<WindowSpa
       window.path = part_of(path, 2 * span.first, window.x.reference_mm.size(),
                             2.0 * setup.contour->reach_s / grid.period_s);
     }
+    if (setup.third) {
+      window.third = make_axis(*setup.third, setup, grid.period_s, slice(third_mm), slice(weight));
+      window.motors = setup.motors;
+    }
     if (from_rest && span.first == 0) {
       for_each_axis(
           [](AxisWindow& axis, const dynamics::NozzleState& state) {
@@ -352,8 +366,16 @@ std::vector<RunWindow> windows(const Course& course, const std::vector<WindowSpa
           window,
           start_of(nozzle, setup, {window.x.reference_mm.front(), window.y.reference_mm.front()}));
     }
+    if (window.third && from_rest && span.first == 0) {
+      const double at_mm = window.third->reference_mm.front();
+      window.third->start = AxisWindow::Start{start_of_mode(nozzle, 2, at_mm), at_mm};
+    }
     if (course.after.empty() && span.last == spans.back().last) {
-      for_each_axis([](AxisWindow& axis) { axis.end_base_mm = axis.reference_mm.back(); }, window);
+      const auto rest = [](AxisWindow& axis) { axis.end_base_mm = axis.reference_mm.back(); };
+      for_each_axis(rest, window);
+      if (window.third) {
+        rest(*window.third);
+      }
     }
     result.push_back(std::move(window));
   }
@@ -388,8 +410,15 @@ void prepare(const Engine& divider, const WindowSpan& span, RunWindow& window) {
 
 AxisSolutions solve(const Engine& engine, const WindowSpan& span, RunWindow& window) {
   if (span.cruise) {
-    return map_axes([](const AxisWindow& axis) { return Result<AxisSolution>(along(axis)); },
-                    window);
+    const auto cruise = [](const AxisWindow& axis) { return Result<AxisSolution>(along(axis)); };
+    AxisSolutions solutions{map_axes(cruise, window)};
+    if (window.third) {
+      solutions.third = cruise(*window.third);
+    }
+    return solutions;
+  }
+  if (window.third) {
+    return solve_modes(engine, window);
   }
   const FreeSolutions free = window.contour ? aim(window) : FreeSolutions{};
   if (window.shares_motors) {
@@ -400,7 +429,7 @@ AxisSolutions solve(const Engine& engine, const WindowSpan& span, RunWindow& win
     return without && broken(without->base, axis) == ActiveLimits{} ? Result<AxisSolution>(*without)
                                                                     : engine.solve(axis);
   };
-  return map_axes(solved, window, free);
+  return {map_axes(solved, window, free)};
 }
 
 Result<dynamics::BaseTrajectory> solve_all(const Engine& engine,
@@ -408,8 +437,15 @@ Result<dynamics::BaseTrajectory> solve_all(const Engine& engine,
                                            std::vector<RunWindow>& windows,
                                            const std::function<void(const AxisSolution&)>& each) {
   Axes<std::vector<dynamics::AxisTrajectory>> solutions;
+  std::vector<dynamics::AxisTrajectory> thirds;
   for (std::size_t i = 0; i < windows.size(); ++i) {
     AxisSolutions solved = solve(engine, spans[i], windows[i]);
+    if (solved.third) {
+      if (!*solved.third) {
+        return tl::unexpected(std::move(solved.third->error()));
+      }
+      thirds.push_back(std::move((*solved.third)->base));
+    }
     for (std::size_t axis = 0; axis < solved.kCount; ++axis) {
       if (!solved[axis]) {
         return tl::unexpected(std::move(solved[axis].error()));
@@ -423,21 +459,88 @@ Result<dynamics::BaseTrajectory> solve_all(const Engine& engine,
   dynamics::BaseTrajectory base{
       map_axes([&](const auto& of_axis) { return join(spans, of_axis); }, solutions),
       windows.front().x.period_s};
-  return windows.front().frame ? in_axes(*windows.front().frame, base) : std::move(base);
+  if (!windows.front().frame) {
+    return base;
+  }
+  return in_axes(*windows.front().frame, base,
+                 thirds.empty() ? std::nullopt : std::optional(join(spans, thirds)),
+                 windows.front().motors.value_or(ModeMotors{}).max_z_accel_mm_s2);
 }
 
+namespace {
+
+// The motion times a share s(t) ≤ 1 that changes slowly, so small that no acceleration is above the
+// limit: z̈ → s z̈ + 2 ṡ ż + s̈ z, of which the first part is by far the largest.
+void keep_z_accel(double most_mm_s2, double period_s, dynamics::AxisTrajectory& z) {
+  constexpr double kSlow_s = 0.03;
+  const std::size_t nodes = z.accel_mm_s2.size();
+  const auto reach = static_cast<std::size_t>(kSlow_s / period_s);
+  const auto around = [&](std::size_t k) {
+    return std::pair(k - std::min(k, reach), std::min(k + reach, nodes - 1));
+  };
+  std::vector<double> needed(nodes, 1.0);
+  for (std::size_t k = 0; k < nodes; ++k) {
+    needed[k] = std::min(1.0, most_mm_s2 / std::abs(z.accel_mm_s2[k]));
+  }
+  if (std::ranges::min(needed) >= 1.0) {
+    return;
+  }
+  // The least share that is needed within the reach, and its mean within the reach, twice.
+  std::vector<double> share(nodes);
+  for (std::size_t k = 0; k < nodes; ++k) {
+    const auto [first, last] = around(k);
+    share[k] = *std::min_element(needed.begin() + static_cast<std::ptrdiff_t>(first),
+                                 needed.begin() + static_cast<std::ptrdiff_t>(last) + 1);
+  }
+  std::vector<double> smooth(nodes);
+  for (std::size_t k = 0; k < nodes; ++k) {
+    const auto [first, last] = around(k);
+    double sum = 0.0;
+    double weights = 0.0;
+    for (std::size_t i = first; i <= last; ++i) {
+      const double part = static_cast<double>(i) - static_cast<double>(k);
+      const double weight = 1.0 - std::abs(part) / (static_cast<double>(reach) + 1.0);
+      sum += weight * share[i];
+      weights += weight;
+    }
+    smooth[k] = sum / weights;
+  }
+  const dynamics::AxisTrajectory whole = z;
+  for (std::size_t k = 0; k < nodes; ++k) {
+    const std::size_t before = k > 0 ? k - 1 : k;
+    const std::size_t after = k + 1 < nodes ? k + 1 : k;
+    const double rate =
+        (smooth[after] - smooth[before]) / (static_cast<double>(after - before) * period_s);
+    z.position_mm[k] = smooth[k] * whole.position_mm[k];
+    z.velocity_mm_s[k] = smooth[k] * whole.velocity_mm_s[k] + rate * whole.position_mm[k];
+    z.accel_mm_s2[k] = smooth[k] * whole.accel_mm_s2[k] + 2.0 * rate * whole.velocity_mm_s[k];
+  }
+}
+
+}  // namespace
+
 dynamics::BaseTrajectory in_axes(const dynamics::ModeFrame& frame,
-                                 const dynamics::BaseTrajectory& in_modes) {
+                                 const dynamics::BaseTrajectory& in_modes,
+                                 const std::optional<dynamics::AxisTrajectory>& third,
+                                 double max_z_accel_mm_s2) {
   dynamics::BaseTrajectory base = in_modes;
+  base.above = third;
   for (const auto member :
        {&dynamics::AxisTrajectory::position_mm, &dynamics::AxisTrajectory::velocity_mm_s,
         &dynamics::AxisTrajectory::accel_mm_s2}) {
     for (std::size_t k = 0; k < base.nodes(); ++k) {
       double& x = (base.x.*member)[k];
       double& y = (base.y.*member)[k];
-      std::tie(x, y) = std::apply([](double a, double b, double) { return std::pair(a, b); },
-                                  frame.to_axes({x, y, 0.0}));
+      const auto at = frame.to_axes({x, y, third ? ((*third).*member)[k] : 0.0});
+      x = at[0];
+      y = at[1];
+      if (base.above) {
+        ((*base.above).*member)[k] = at[2];
+      }
     }
+  }
+  if (base.above) {
+    keep_z_accel(max_z_accel_mm_s2, base.period_s, *base.above);
   }
   return base;
 }

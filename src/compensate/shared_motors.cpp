@@ -69,7 +69,8 @@ void halve(RunWindow& window) {
 
 AxisSolutions solve_with_shared_motors(const Engine& engine, RunWindow& window) {
   const auto solve_both = [&] {
-    return map_axes([&](const AxisWindow& axis) { return engine.solve(axis); }, window);
+    return AxisSolutions{
+        map_axes([&](const AxisWindow& axis) { return engine.solve(axis); }, window)};
   };
   const BaseLimits& limits = window.x.limits;
   AxisSolutions best = solve_both();

@@ -68,7 +68,8 @@ std::array<double, kMaxSamples + 1> nozzle_error(const FlexibleAxis& axis,
   return d;
 }
 
-// The largest e of one line, over both axes.
+// The largest e of one line, over all axes. Modes that move the nozzle in Z move it in X, too, so
+// the axis X stands for Z.
 double largest_nozzle_error_mm(const BaseTrajectory& base, double from, double to,
                                const LineRules& rules) {
   const double duration = to - from;
@@ -79,9 +80,12 @@ double largest_nozzle_error_mm(const BaseTrajectory& base, double from, double t
         return nozzle_error(axis, of_base, base, from, duration, steps);
       },
       rules.nozzle, base);
+  const auto in_z = base.above
+                        ? nozzle_error(rules.nozzle.x, *base.above, base, from, duration, steps)
+                        : std::array<double, kMaxSamples + 1>{};
   double largest2 = 0.0;
   for (std::size_t i = 0; i <= static_cast<std::size_t>(steps); ++i) {
-    largest2 = std::max(largest2, squared(XY{errors.x[i], errors.y[i]}));
+    largest2 = std::max(largest2, squared(XY{errors.x[i], errors.y[i]}) + in_z[i] * in_z[i]);
   }
   return std::sqrt(largest2);
 }

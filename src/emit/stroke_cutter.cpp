@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "dialect.hpp"
@@ -14,11 +15,13 @@ using gcode::Z;
 
 // Whether the line is long enough for the firmware to move at once, and not only with the next
 // line.
-bool goes_through(const Stroke& from, const Stroke& to, const Grid& grid, const LineRules& rules) {
+bool goes_through(const Stroke& from, const Stroke& to, bool moves_in_z, const Grid& grid,
+                  const LineRules& rules) {
   const double steps = most_of_axes(
       [](double way_mm, const AxisGrid& axis) { return std::abs(way_mm) / axis.step_mm; },
       to.place_mm - from.place_mm, grid);
-  return steps > rules.min_steps - 0.5;
+  const double steps_of_z = std::abs(to.z_mm - from.z_mm) / grid.z.step_mm;
+  return (moves_in_z ? std::max(steps, steps_of_z) : steps) > rules.min_steps - 0.5;
 }
 
 XY velocity_mm_s(const Stroke& from, const Stroke& to) {
@@ -31,25 +34,21 @@ bool turns_quickly(const XY& before, const XY& after, const LineRules& rules) {
 }
 
 // The part of its change of Z that a line can take. The line must not become steep, nor slow: Z has
-// limits of its own, which a run leaves as they are. The rest waits for other lines, as long as it
-// is too small to be seen. `before` and `after` are the velocities of the neighbouring lines.
+// limits of its own, which a run leaves as they are. The rest waits for other lines. `before` and
+// `after` are the velocities of the neighbouring lines.
 double change_of_z_mm(const Stroke& from, const Stroke& to, const XY& before, const XY& after,
-                      const Grid& grid, const EmitOptions& options) {
-  constexpr double kUnseen_mm = 0.01;
-  // Share of the line's time that ramps may take. F makes up for them, so F changes more than the
-  // speed does.
-  constexpr double kRamps = 0.03;
+                      const Climb& climb, const Grid& grid, const EmitOptions& options) {
   const double length_mm = distance(from.place_mm, to.place_mm);
   const double dz = to.z_mm - from.z_mm;
-  double most = 2.0 * gcode::kMaxSlope * length_mm;
-  if (std::abs(dz) < kUnseen_mm) {
+  double most = climb.steepest * std::max(length_mm, grid.x.step_mm);
+  if (std::abs(dz) < climb.waits_mm) {
     const double duration_s = to.end_s - from.end_s;
     const XY own = velocity_mm_s(from, to);
     // Where the path bends, a line has to slow down as if it had a ramp.
     const auto change_mm_s = [&](const XY& other) { return distance(other, own); };
     const ZLimits limits = z_limits(options.fixed, options.run_limits);
     most = std::min({most, limits.speed_mm_s * duration_s,
-                     kRamps * limits.accel_mm_s2 * length_mm * duration_s /
+                     climb.ramps * limits.accel_mm_s2 * length_mm * duration_s /
                          std::max(change_mm_s(before), change_mm_s(after))});
   }
   if (std::abs(dz) <= most) {
@@ -111,20 +110,20 @@ class StrokeCutter {
   void fit_to_next(std::size_t i, Stroke& stroke) const {
     const Stroke next{times_[i + 1] - dropped_s_, vertices_.place_mm(i + 1)};
     if (!grid_.x.is_coarse() && !result_.strokes.empty() &&
-        !goes_through(last_, stroke, grid_, rules_) &&
+        !goes_through(last_, stroke, table_.moves_in_z(), grid_, rules_) &&
         turns_quickly(before_, velocity_mm_s(last_, next), rules_)) {
       // The base rests here while it turns round. A line without a length would become part of the
       // next one.
       give_length(next, grid_, rules_, stroke);
     }
     stroke.z_mm = last_.z_mm + change_of_z_mm(last_, stroke, before_, velocity_mm_s(stroke, next),
-                                              grid_, options_);
+                                              climb_of(table_.moves_in_z()), grid_, options_);
   }
 
   // Adds the stroke, if it has a length. Otherwise it becomes part of the next one, or is dropped
   // at the start of the run.
   void take(std::size_t i, const Stroke& stroke) {
-    if (goes_through(last_, stroke, grid_, rules_)) {
+    if (goes_through(last_, stroke, table_.moves_in_z(), grid_, rules_)) {
       before_ = velocity_mm_s(last_, stroke);
       result_.laying +=
           result_.laying == result_.strokes.size() && !table_.tail_at(times_[i - 1]) ? 1 : 0;
@@ -153,6 +152,12 @@ class StrokeCutter {
 
 }  // namespace
 
+Climb climb_of(bool moves_in_z) {
+  // A base that moves in Z to make up for modes does so at corners, too, where X and Y are slow.
+  return moves_in_z ? Climb{1.0, 0.25, std::numeric_limits<double>::infinity()}
+                    : Climb{2.0 * gcode::kMaxSlope, 0.03, 0.01};
+}
+
 BareStrokes cut_strokes(const Timetable& table, const Polygon& vertices,
                         const std::vector<double>& event_times_s, const Grid& grid,
                         const LineRules& rules, const EmitOptions& options, const Stroke& from,
@@ -160,12 +165,12 @@ BareStrokes cut_strokes(const Timetable& table, const Polygon& vertices,
   return StrokeCutter(table, vertices, event_times_s, grid, rules, options, from, end, ends).cut();
 }
 
-void climb_in_time(const Stroke& start, XY after, const Grid& grid, const EmitOptions& options,
-                   std::vector<Stroke>& strokes) {
+void climb_in_time(const Stroke& start, XY after, const Climb& climb, const Grid& grid,
+                   const EmitOptions& options, std::vector<Stroke>& strokes) {
   for (std::size_t i = strokes.size(); i-- > 1;) {
     const XY before = velocity_mm_s(i > 1 ? strokes[i - 2] : start, strokes[i - 1]);
     const double change_mm =
-        change_of_z_mm(strokes[i - 1], strokes[i], before, after, grid, options);
+        change_of_z_mm(strokes[i - 1], strokes[i], before, after, climb, grid, options);
     const double left_mm = strokes[i].z_mm - strokes[i - 1].z_mm - change_mm;
     if (left_mm == 0.0) {
       return;

@@ -18,6 +18,18 @@ struct BareStrokes {
   std::size_t laying = 0;  // lines that lay the run's filament; lines of the tail come after them
 };
 
+// How lines take changes of Z.
+struct Climb {
+  double steepest = 0.0;  // the largest slope of a line
+  // Share of the line's time that ramps may take. F makes up for them, so F changes more than the
+  // speed does.
+  double ramps = 0.0;
+  double waits_mm = 0.0;  // a change that is smaller may wait for other lines
+};
+
+// moves_in_z: whether the base moves in Z to make up for modes.
+[[nodiscard]] Climb climb_of(bool moves_in_z);
+
 // Cuts the strokes from vertex to vertex, and merges those that would have no length. from: where
 // the machine stands. end: where the last stroke ends.
 [[nodiscard]] BareStrokes cut_strokes(const Timetable& table, const Polygon& vertices,
@@ -28,7 +40,7 @@ struct BareStrokes {
 
 // The run must end at its height. If the last line cannot take all of its change of Z, the lines
 // before it take the rest. `after`: the velocity behind the last line.
-void climb_in_time(const Stroke& start, XY after, const Grid& grid, const EmitOptions& options,
-                   std::vector<Stroke>& strokes);
+void climb_in_time(const Stroke& start, XY after, const Climb& climb, const Grid& grid,
+                   const EmitOptions& options, std::vector<Stroke>& strokes);
 
 }  // namespace unflex::emit

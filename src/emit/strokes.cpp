@@ -107,9 +107,12 @@ gcode::Position start_of(const Run& run) {
   return run.moves->front().segment.start_mm;
 }
 
-gcode::Position start_position(const Run& run, const Grid& grid) {
+gcode::Position start_position(const Run& run, const Timetable& table, const Grid& grid) {
   gcode::Position start = run.moves->front().segment.start_mm;
   set_xy(start, start_of_lines(run, grid));
+  if (run.goes_on && run.base->above) {
+    start[Z] = grid.z.nearest(table.height_mm(0.0));
+  }
   return start;
 }
 
@@ -254,11 +257,23 @@ Passing passing(const Run& run) {
   return result;
 }
 
+// What the base's motion in Z asks of a motor of X or Y. Lines are cut for X and Y, so this much
+// acceleration is kept for Z.
+double accel_for_z_mm_s2(const Run& run, const LineRules& rules) {
+  double most = 0.0;
+  if (run.base->above) {
+    for (const double accel : run.base->above->accel_mm_s2) {
+      most = std::max(most, rules.motors.largest_of_xy({}, accel));
+    }
+  }
+  return std::min(most, 0.5 * rules.max_accel_mm_s2);
+}
+
 LineRules rules_for(const Run& run, const EmitOptions& options) {
   LineRules rules = options.lines;
   rules.tolerance_mm *= run.tolerance_share;
   rules.burst_lines = static_cast<int>(run.limits_share * rules.burst_lines);
-  rules.max_accel_mm_s2 *= run.limits_share;
+  rules.max_accel_mm_s2 = run.limits_share * rules.max_accel_mm_s2 - accel_for_z_mm_s2(run, rules);
   return rules;
 }
 
@@ -305,7 +320,7 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
   if (vertices.times_s.empty()) {
     return {};
   }
-  const gcode::Position start = start_position(run, grid);
+  const gcode::Position start = start_position(run, table, grid);
   const gcode::Position end = end_of_lines(run, table, grid);
   const Stroke from{0.0, xy_of(start), start[Z]};
   const Passing ends = passing(run);
@@ -317,7 +332,8 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
   }
   result.back().place_mm = xy_of(end);
   result.back().z_mm = end[Z];
-  climb_in_time(from, ends.out_mm_s.value_or(XY{}), grid, options, result);
+  climb_in_time(from, ends.out_mm_s.value_or(XY{}), climb_of(table.moves_in_z()), grid, options,
+                result);
   const double file_start_e_mm = start_of(run)[gcode::E];
   const RunFilament filament{end[gcode::E] - file_start_e_mm, file_start_e_mm - start[gcode::E]};
   lay_filament(run, table, nozzle, filament, start, bare.ends_s, bare.laying, options, result);
@@ -336,7 +352,8 @@ void time_strokes(const Run& run, const Grid& grid, const EmitOptions& options,
     skipped = strokes.back();
     strokes.pop_back();
   }
-  set_speeds(start_position(run, grid), passing(run), options, grid, run.late_s, strokes);
+  set_speeds(start_position(run, Timetable(run), grid), passing(run), options, grid, run.late_s,
+             strokes);
   if (skipped) {
     skipped->speed_mm_s = strokes.back().speed_mm_s;
     skipped->feed_decimals = strokes.back().feed_decimals;

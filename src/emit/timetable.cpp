@@ -40,6 +40,11 @@ bool Timetable::tail_at(double t) const {
 }
 
 double Timetable::height_mm(double t) const {
+  const dynamics::BaseTrajectory& base = *run_->base;
+  return plan_height_mm(t) + (base.above ? base.at(*base.above, t).position_mm : 0.0);
+}
+
+double Timetable::plan_height_mm(double t) const {
   if (t >= starts_s_.back()) {
     return run_->moves->back().segment.end_mm[Z];
   }

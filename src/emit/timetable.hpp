@@ -23,9 +23,13 @@ class Timetable {
   // Whether the moves have ended at time t.
   [[nodiscard]] bool tail_at(double t) const;
 
-  // Z at time t. Each move's change of Z is spread along the base's path while the move lasts. This
-  // keeps the slope small where the base is slower than the plan.
+  // Whether the base moves in Z to make up for modes.
+  [[nodiscard]] bool moves_in_z() const { return run_->base->above.has_value(); }
+  // Z at time t: the plan's, and how far the base is above it.
   [[nodiscard]] double height_mm(double t) const;
+  // The plan's Z at time t. Each move's change of Z is spread along the base's path while the move
+  // lasts. This keeps the slope small where the base is slower than the plan.
+  [[nodiscard]] double plan_height_mm(double t) const;
 
   // Whether a line across the boundary before move i would give either move too much filament or
   // too little, since filament per mm changes there.

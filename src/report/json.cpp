@@ -96,7 +96,11 @@ Json plants_json(const std::vector<PlantDeviation>& plants) {
 }
 
 Json rows_json(const verify::Deviation& rows) {
-  return {{"extruding", row_json(rows.extruding)}, {"all", row_json(rows.all)}};
+  Json json = {{"extruding", row_json(rows.extruding)}, {"all", row_json(rows.all)}};
+  if (rows.height) {
+    json["height"] = {{"max_mm", rows.height->max_mm}, {"rms_mm", rows.height->rms_mm}};
+  }
+  return json;
 }
 
 Json fallbacks_json(const std::vector<Fallback>& fallbacks) {

@@ -136,6 +136,15 @@ void write_corners(Sink out, const verify::CornerStats& before, const verify::Co
   }
 }
 
+void write_height(Sink out, const std::optional<verify::HeightStats>& before,
+                  const std::optional<verify::HeightStats>& after) {
+  if (before && after) {
+    fmt::format_to(out, "  {:<16}{:<20}{:<20}{}\n", "height",
+                   change_text(before->max_mm, after->max_mm), "",
+                   change_text(before->rms_mm, after->rms_mm));
+  }
+}
+
 void write_line(Sink out, const verify::LineStats& before, const verify::LineStats& after) {
   if (!before.is_known()) {
     return;
@@ -454,6 +463,7 @@ std::string to_text(const Report& report) {
                    "                  (in travel, where nothing is laid, straying is harmless)\n");
   }
   write_corners(out, report.measured.uncompensated.corners, report.measured.compensated.corners);
+  write_height(out, report.measured.uncompensated.height, report.measured.compensated.height);
   write_line(out, report.measured.uncompensated.line, report.measured.compensated.line);
   write_sensitivity(out, report);
   write_unshaped(out, report.measured.unshaped);

@@ -87,10 +87,15 @@ XY NozzleOnBase::advance_swing(std::size_t k) {
           },
           *base_);
     };
+    const auto above = [&](double parts) {
+      return base_->above ? dynamics::between(*base_->above, k, parts * h, base_->period_s)
+                          : dynamics::AxisMotion{};
+    };
     const Axes<dynamics::AxisMotion> begin = at(i);
     const Axes<dynamics::AxisMotion> middle = at(i + 0.5);
-    frame_->advance({begin.x.velocity_mm_s, begin.y.velocity_mm_s, 0.0},
-                    {middle.x.accel_mm_s2, middle.y.accel_mm_s2, 0.0}, h, nozzle_);
+    frame_->advance({begin.x.velocity_mm_s, begin.y.velocity_mm_s, above(i).velocity_mm_s},
+                    {middle.x.accel_mm_s2, middle.y.accel_mm_s2, above(i + 0.5).accel_mm_s2}, h,
+                    nozzle_);
   }
   const auto ahead = frame_->ahead(nozzle_);
   return base_->node_mm(k + 1) + XY{ahead[0].position, ahead[1].position};

@@ -27,25 +27,31 @@ std::string failure_of(const RunJob& job) {
       }
     }
   }
+  for (std::size_t window = 0; window < job.windows.thirds.size(); ++window) {
+    if (const std::string& failure = job.windows.thirds[window].failure; !failure.empty()) {
+      return fmt::format("the solver failed on the third mode, window {}: {}", window + 1, failure);
+    }
+  }
   return {};
 }
 
 // The base of the first stage, shaped by the second, from the course's first node on. For a part
 // this includes the nodes after its last one.
-dynamics::BaseTrajectory both_stages(const RunJob& job, Axes<dynamics::AxisTrajectory> first) {
-  dynamics::BaseTrajectory base{std::move(first), job.grid.period_s};
+dynamics::BaseTrajectory both_stages(const RunJob& job, dynamics::BaseTrajectory base) {
   const std::size_t more = compensate::nodes_of_shaping(job.setup, job.grid.period_s);
   base = compensate::shaped(base, job.setup, job.piece.begins_run() ? more : 0,
                             job.piece.ends_run() ? more : 0);
   const auto before = static_cast<std::ptrdiff_t>(job.grid.first);
-  for_each_axis(
-      [&](dynamics::AxisTrajectory& axis) {
-        for (std::vector<double>* values :
-             {&axis.position_mm, &axis.velocity_mm_s, &axis.accel_mm_s2}) {
-          values->erase(values->begin(), values->begin() + before);
-        }
-      },
-      base);
+  const auto trim = [&](dynamics::AxisTrajectory& axis) {
+    for (std::vector<double>* values :
+         {&axis.position_mm, &axis.velocity_mm_s, &axis.accel_mm_s2}) {
+      values->erase(values->begin(), values->begin() + before);
+    }
+  };
+  for_each_axis(trim, base);
+  if (base.above) {
+    trim(*base.above);
+  }
   return base;
 }
 
@@ -64,7 +70,17 @@ dynamics::BaseTrajectory joined(RunJob& job) {
       map_axes([&](const auto& of_axis) { return compensate::join(job.windows.spans, of_axis); },
                solutions),
       job.grid.period_s};
-  return job.setup.frame ? compensate::in_axes(*job.setup.frame, base) : std::move(base);
+  if (!job.setup.frame) {
+    return base;
+  }
+  std::vector<dynamics::AxisTrajectory> thirds;
+  for (AxisResult& third : job.windows.thirds) {
+    thirds.push_back(std::move(third.base));
+  }
+  return compensate::in_axes(
+      *job.setup.frame, base,
+      thirds.empty() ? std::nullopt : std::optional(compensate::join(job.windows.spans, thirds)),
+      job.setup.motors.value_or(compensate::ModeMotors{}).max_z_accel_mm_s2);
 }
 
 // The base optimised for the nominal axes alone.
@@ -172,25 +188,6 @@ emit::Run RunJob::run(double tolerance_share, double limits_share,
   return run;
 }
 
-namespace {
-
-// Axes have the modes by what they show of them, and take the swing as one of their main modes.
-dynamics::NozzleXY as_on_axes(const RunJob& job, const dynamics::ModeFrame& frame) {
-  const auto ahead = frame.ahead(job.nozzle);
-  const XY start_mm = xy_of(job.piece.moves.front().segment.start_mm);
-  dynamics::NozzleXY nozzle;
-  for (std::size_t axis = 0; axis < XY::kCount; ++axis) {
-    const dynamics::FlexibleAxis& of_setup = job.setup[axis].axis;
-    nozzle[axis] = of_setup.riding(start_mm[axis]);
-    const auto main = static_cast<std::size_t>(&of_setup.main() - of_setup.modes().data());
-    nozzle[axis].parts[main].position += ahead[axis].position;
-    nozzle[axis].parts[main].velocity += ahead[axis].velocity;
-  }
-  return nozzle;
-}
-
-}  // namespace
-
 AxisResult axis_result(Result<compensate::AxisSolution> solution) {
   if (!solution) {
     return {{}, 0, solution.error().message};
@@ -201,9 +198,6 @@ AxisResult axis_result(Result<compensate::AxisSolution> solution) {
 dynamics::NozzleXY first_stage(const RunJob& job, const verify::NozzleModel& model) {
   if (job.setup.frame) {
     return job.nozzle;
-  }
-  if (model.frame) {
-    return as_on_axes(job, *model.frame);
   }
   return map_axes([](const compensate::AxisSetup& setup, const dynamics::FlexibleAxis& axis,
                      const dynamics::NozzleState& nozzle,
@@ -326,6 +320,7 @@ void lay_out(RunJob& job) {
   }
   job.windows.spans = compensate::mesh(job.course(), job.grid, job.setup);
   job.windows.results.resize(job.windows.spans.size());
+  job.windows.thirds.resize(job.setup.third ? job.windows.spans.size() : 0);
   job.windows.unsolved = 2 * job.windows.spans.size();
   job.stage = Stage::laid_out;
 }
@@ -346,6 +341,9 @@ bool solve_windows(RunJob& job, std::size_t first, std::size_t count,
     for (std::size_t i = 0; i < count; ++i) {
       compensate::AxisSolutions solutions =
           compensate::solve(engine, of_run.spans[first + i], windows[i]);
+      if (solutions.third) {
+        of_run.thirds[first + i] = axis_result(std::move(*solutions.third));
+      }
       for (std::size_t axis = 0; axis < solutions.kCount; ++axis) {
         Result<compensate::AxisSolution>& solution = solutions[axis];
         for (Probe& probe : of_run.probes) {
@@ -382,6 +380,7 @@ void make_lines(RunJob& job) noexcept {
     job.failure = exception.what();
   }
   job.windows.results.clear();
+  job.windows.thirds.clear();
   job.stage = Stage::lined;
 }
 

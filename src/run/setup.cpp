@@ -68,21 +68,79 @@ double times_by_modes(const std::optional<dynamics::ModeFrame>& frame) {
   return most;
 }
 
-// Sets X and Y of the setup to the modes of a machine whose Z is rigid. Where the base may go is
-// not limited: verification sees to it that it stays within the travel.
+// The motors by the modes that they move: G Φ.
+compensate::ModeMotors motors_of(const dynamics::ModeFrame& frame, const Motors& motors) {
+  compensate::ModeMotors result;
+  for (std::size_t i = 0; i < Motors::kCount; ++i) {
+    for (std::size_t mode = 0; mode < Motors::kCount; ++mode) {
+      const auto& to_axes = frame.to_axes();
+      result.by_modes[i][mode] = motors.of(i, to_axes[0][mode], to_axes[1][mode], to_axes[2][mode]);
+    }
+  }
+  return result;
+}
+
+// How much the motors move per motion of a mode alone.
+double gain_of_mode(const compensate::ModeMotors& motors, std::size_t mode) {
+  double most = 0.0;
+  for (const auto& motor : motors.by_modes) {
+    most = std::max(most, std::abs(motor[mode]));
+  }
+  return most;
+}
+
+// Sets the limits of acceleration of all modes, where Z swings too.
+void limit_modes(double max_accel_mm_s2, compensate::Setup& setup) {
+  // Lines are cut for X and Y, and Z comes with them. This share of the limit leaves room for what
+  // Z then asks of the motors beyond the base.
+  constexpr double kShareOfBase = 0.95;
+  max_accel_mm_s2 *= kShareOfBase;
+  setup.motors->max_accel_mm_s2 = max_accel_mm_s2;
+  const std::array<compensate::AxisSetup*, 3> modes = {&setup.x, &setup.y, &*setup.third};
+  for (std::size_t i = 0; i < modes.size(); ++i) {
+    modes[i]->limits.max_accel_mm_s2 = max_accel_mm_s2 / gain_of_mode(*setup.motors, i);
+  }
+}
+
+compensate::AxisSetup setup_of_mode(const dynamics::Mode& mode, const machine::Settings& settings) {
+  compensate::AxisSetup axis;
+  axis.axis = dynamics::FlexibleAxis(mode.omega_rad_s, mode.zeta);
+  axis.plants = plants({.freq_hz = axis.axis.main_hz(), .damping_ratio = mode.zeta}, settings);
+  return axis;
+}
+
+// The share of the firmware's acceleration of Z that the base may ask for. The rest is for lines,
+// which change their speed at once.
+constexpr double kShareOfZ = 0.5;
+
+// Sets X and Y of the setup to the modes of the machine, and the third mode if Z is not rigid.
+// Where the base may go is not limited: verification sees to it that it stays within the travel.
 void take_modes(const dynamics::ModeFrame& frame, const machine::Settings& settings,
                 compensate::Setup& setup) {
   const double times = times_by_modes(frame);
   for (std::size_t i = 0; i < XY::kCount; ++i) {
-    compensate::AxisSetup& axis = setup[i];
-    axis.axis = dynamics::FlexibleAxis(frame.mode(i)->omega_rad_s, frame.mode(i)->zeta);
-    axis.plants =
-        plants({.freq_hz = axis.axis.main_hz(), .damping_ratio = frame.mode(i)->zeta}, settings);
+    compensate::AxisSetup axis = setup_of_mode(*frame.mode(i), settings);
+    axis.limits = setup[i].limits;
     axis.limits.min_position_mm = -std::numeric_limits<double>::infinity();
     axis.limits.max_position_mm = std::numeric_limits<double>::infinity();
     axis.limits.max_velocity_mm_s /= times;
     axis.limits.max_accel_mm_s2 /= times;
     axis.limits.max_jerk_mm_s3 /= times;
+    setup[i] = axis;
+  }
+  if (frame.mode(2)) {
+    setup.third = setup_of_mode(*frame.mode(2), settings);
+    setup.third->limits.max_jerk_mm_s3 = setup.x.limits.max_jerk_mm_s3;
+    setup.motors = motors_of(frame, settings.motors());
+    setup.motors->max_velocity_mm_s = settings.base_max_velocity_mm_s();
+    setup.motors->max_z_accel_mm_s2 = kShareOfZ * settings.axis_max_accel_mm_s2()[gcode::Z];
+    const std::array<compensate::AxisSetup*, 3> modes = {&setup.x, &setup.y, &*setup.third};
+    for (std::size_t i = 0; i < modes.size(); ++i) {
+      modes[i]->limits.max_velocity_mm_s =
+          setup.motors->max_velocity_mm_s / gain_of_mode(*setup.motors, i);
+    }
+    limit_modes(planned_base_accel_mm_s2(settings, 0.0), setup);
+    setup.shares_motors = false;
   }
   setup.contour.reset();
   setup.jerk_weight = settings.tracking_jerk_weight();
@@ -205,8 +263,7 @@ compensate::Setup compensate_setup(const machine::Settings& settings) {
                                         .tracking_jerk_weight = settings.tracking_jerk_weight(),
                                         .pairs = compensate::pairs_of(setup)};
   }
-  if (const std::optional<dynamics::ModeFrame> frame = machine::mode_frame(settings);
-      frame && !frame->mode(2)) {
+  if (const std::optional<dynamics::ModeFrame> frame = machine::mode_frame(settings)) {
     take_modes(*frame, settings, setup);
   }
   return setup;
@@ -232,6 +289,9 @@ RunSetup setup_for(const compensate::Setup& setup, const Piece& run,
         axis.limits.max_accel_mm_s2 = result.accel.base_mm_s2 / gain;
       },
       result.setup);
+  if (result.setup.third) {
+    limit_modes(result.accel.base_mm_s2, result.setup);
+  }
   for (std::size_t axis = 0; axis < XY::kCount; ++axis) {
     const bool above = std::ranges::all_of(run.moves, [&](const planner::PlannedMove& move) {
       return move.segment.start_mm[axis] >= 0.0 && move.segment.end_mm[axis] >= 0.0;
@@ -242,7 +302,11 @@ RunSetup setup_for(const compensate::Setup& setup, const Piece& run,
   }
   if (run.begins_run()) {
     const double half_s = half_period_s(settings);
-    const double swing_s = swings && draws_soon(run, settings) ? half_s : 0.0;
+    // Three modes have to get ahead of the nozzle together, within Z's own limits. A straight
+    // begin does not help: it moves the nozzle in Z, too.
+    const bool is_slow = swings || result.setup.third;
+    const double times = result.setup.third ? 2.0 : 1.0;
+    const double swing_s = is_slow && draws_soon(run, settings) ? times * half_s : 0.0;
     // The plan begins at a node, where its acceleration may leap.
     const double nodes = std::ceil(time_ahead_s(run, result.setup, half_s) / setup.period_s);
     result.setup.lead_in_s = std::max({result.setup.lead_in_s, swing_s, nodes * setup.period_s});

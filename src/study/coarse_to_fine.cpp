@@ -35,7 +35,7 @@ Result<Solved> solve(const compensate::RunWindow& window, const compensate::Engi
   double spent_s = 0.0;
   for (int i = 0; i < kRepeats && spent_s < kEnough_s; ++i) {
     const auto start = std::chrono::steady_clock::now();
-    compensate::AxisSolutions both =
+    Axes<Result<compensate::AxisSolution>> both =
         map_axes([&](const compensate::AxisWindow& of) { return engine.solve(of); }, window);
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
     Result<Axes<compensate::AxisSolution>> solutions = values_of(std::move(both));

@@ -173,7 +173,8 @@ void Bundle::set_swing(std::size_t number, const NozzleXY& swing, const dynamics
 }
 
 // ẏ = u̇ − β̇ and ü = −2ζω ẏ − ω² y, where β̈ is constant.
-void Bundle::step_swings(const dynamics::BaseXY& base, double h, int rk4_steps) {
+void Bundle::step_swings(const dynamics::BaseXY& base, const dynamics::BaseSegment& z, double h,
+                         int rk4_steps) {
   const double dt = h / rk4_steps;
   dynamics::BaseXY end = base;
   for_each_axis(
@@ -184,8 +185,8 @@ void Bundle::step_swings(const dynamics::BaseXY& base, double h, int rk4_steps) 
       end);
   for (std::size_t number = 0; number < models_.size(); ++number) {
     const dynamics::ModeFrame& frame = *models_[number].frame;
-    const auto velocity = frame.to_modes({base.x.velocity, base.y.velocity, 0.0});
-    const auto accel = frame.to_modes({base.x.acceleration, base.y.acceleration, 0.0});
+    const auto velocity = frame.to_modes({base.x.velocity, base.y.velocity, z.velocity});
+    const auto accel = frame.to_modes({base.x.acceleration, base.y.acceleration, z.acceleration});
     NozzleXY of_nozzle = swing(number);
     for (std::size_t i = 0; i < accel.size(); ++i) {
       if (!frame.mode(i)) {
@@ -253,7 +254,7 @@ void Bundle::shift(const XY& by_mm) {
 
 void Bundle::settle(const dynamics::BaseXY& base, double duration_s) {
   if (has_frames()) {
-    step_swings(base, duration_s, rk4_steps_of(duration_s));
+    step_swings(base, {}, duration_s, rk4_steps_of(duration_s));
     return;
   }
   change_all(
@@ -313,9 +314,13 @@ int Bundle::rk4_steps_of(double h) const {
   return std::max(static_cast<int>(std::ceil(fastest_rad_s_ * h / kLongest)), 1);
 }
 
-void Bundle::step(const dynamics::BaseXY& base) {
+double Bundle::above_mm(std::size_t number) const {
+  return has_frames() ? models_[number].frame->ahead(swing(number))[2].position : 0.0;
+}
+
+void Bundle::step(const dynamics::BaseXY& base, const dynamics::BaseSegment& z) {
   if (has_frames()) {
-    step_swings(base, h_, rk4_steps_);
+    step_swings(base, z, h_, rk4_steps_);
   } else if (has_maps_) {
     kernel_->step_by_maps(base, arrays_);
   } else {

@@ -55,8 +55,11 @@ class Bundle {
 
   // Announces `steps` steps of h seconds.
   void begin_steps(double steps, double h);
-  // base: at the start of the step.
-  void step(const dynamics::BaseXY& base);
+  // base, z: at the start of the step. z counts where modes move the nozzle in Z.
+  void step(const dynamics::BaseXY& base, const dynamics::BaseSegment& z = {});
+  // How far the nozzle is above the base, mm. 0 where modes lie along the axes.
+  [[nodiscard]] double above_mm(std::size_t number = 0) const;
+  [[nodiscard]] bool moves_in_z() const { return has_frames() && models_.front().frame->mode(2); }
 
   // Measures c of all nozzles at the time of the last slide() of `near`, and since the look before,
   // h seconds ago. h is 0 if the two looks are not connected.
@@ -90,7 +93,8 @@ class Bundle {
   [[nodiscard]] NozzleXY swing(std::size_t number) const;
   void set_swing(std::size_t number, const NozzleXY& swing, const dynamics::BaseXY& base);
   // Moves the swings by rk4_steps steps of RK4 while the base goes on for h seconds.
-  void step_swings(const dynamics::BaseXY& base, double h, int rk4_steps);
+  void step_swings(const dynamics::BaseXY& base, const dynamics::BaseSegment& z, double h,
+                   int rk4_steps);
   // change(axis, value, nozzle) for each axis of each nozzle.
   template <class Change, class Value>
   void change_all(const Change& change, const Axes<Value>& by);

@@ -219,8 +219,9 @@ void Meter::step(BasePhase& phase, double h, bool rides) {
     set_xy(machine_at_mm_, dynamics::place_mm(phase.xy));
     bundle_.set_frequencies(over_bed_->frequency_shares(machine_at_mm_));
   }
-  bundle_.step(phase.xy);
+  bundle_.step(phase.xy, phase.z);
   advance(phase.xy, h);
+  advance(phase.z, h);
   advance(phase.e, h);
   advance(phase.pushed, h);
   if (rides) {
@@ -271,6 +272,12 @@ void Meter::integrate(BasePhase& phase, double duration_s, bool measured) {
       bundle_.count(measured, phase.extruding);
       count(*last_look_, sample, reference, nozzle, measured, phase.extruding, h);
       last_look_ = sample;
+    }
+    if (measured && phase.extruding && bundle_.moves_in_z()) {
+      const PathPiece& piece = (*path_)[current_];
+      height_.add(phase.z.position + bundle_.above_mm() -
+                      piece.move.position_mm(time_s_ - piece.start_s)[gcode::Z],
+                  h);
     }
     if (!waiting_) {
       count_filament(phase, pushed_from, reference, nozzle, measured, h);

@@ -45,6 +45,24 @@ class FeedGauge {
   std::size_t line_ = 0;
 };
 
+// How far the nozzle is above or below its plan.
+class HeightGauge {
+ public:
+  void add(double above_mm, double weight_s) {
+    sum_mm2_s_ += above_mm * above_mm * weight_s;
+    weight_s_ += weight_s;
+    max_mm_ = std::max(max_mm_, std::abs(above_mm));
+  }
+  [[nodiscard]] HeightStats stats() const {
+    return {max_mm_, weight_s_ > 0.0 ? std::sqrt(sum_mm2_s_ / weight_s_) : 0.0};
+  }
+
+ private:
+  double sum_mm2_s_ = 0.0;
+  double weight_s_ = 0.0;
+  double max_mm_ = 0.0;
+};
+
 // The contour error of a nozzle in one section.
 class SectionError {
  public:
@@ -143,6 +161,10 @@ class Meter {
   [[nodiscard]] double lag_s() const { return lag_.present_s(); }
 
   [[nodiscard]] double time_s() const { return time_s_; }
+  // nullopt where modes do not move the nozzle in Z.
+  [[nodiscard]] std::optional<HeightStats> height() const {
+    return bundle_.moves_in_z() ? std::optional(height_.stats()) : std::nullopt;
+  }
   [[nodiscard]] NozzleXY nozzle() const { return bundle_.nozzle(); }
   [[nodiscard]] const XY& base_mm() const { return base_mm_; }
   [[nodiscard]] const DeviationAccumulator& extruding() const { return extruding_; }
@@ -189,6 +211,7 @@ class Meter {
   std::optional<Sample> last_look_;
   bool last_measured_ = false;
   XY base_mm_;
+  HeightGauge height_;
   const MachineChange* over_bed_ = nullptr;  // set while frequencies change over the bed
   gcode::Position machine_at_mm_{};          // where they are those of bundle_
   std::size_t current_ = 0;                  // piece of the reference at time_s_

@@ -44,6 +44,7 @@ void append_phases(const planner::PlannedMove& move, double pushed_mm,
                                    ratio * phase.accel_mm_s2};
     };
     phases.push_back({map_axes(along, xy_of(move.segment.start_mm), xy_of(move.direction)),
+                      along(move.segment.start_mm[gcode::Z], move.direction[gcode::Z]),
                       along_filament(move, laid_mm, distance_mm, phase),
                       along_filament(move, pushed_mm, distance_mm, phase), phase.duration_s,
                       move.segment.extruding()});
@@ -100,6 +101,7 @@ void ShapedBase::rest(double duration_s, std::vector<BasePhase>& shaped) {
     return later(base, last.phase.duration_s).position;
   };
   give({.xy = resting_at(map_axes(at_end, last.phase.xy)),
+        .z = {at_end(last.phase.z), 0.0, 0.0},
         .e = {filament_mm_, 0.0, 0.0},
         .duration_s = duration_s});
   advance(shaped);
@@ -127,6 +129,7 @@ void ShapedBase::advance(std::vector<BasePhase>& shaped) {
     for (std::size_t axis = 0; axis < dynamics::BaseXY::kCount; ++axis) {
       phase.xy[axis] = sum(xy_[axis], [axis](const BasePhase& of) { return of.xy[axis]; });
     }
+    phase.z = sum(e_, [](const BasePhase& of) { return of.z; });
     phase.e = sum(e_, [](const BasePhase& of) { return of.e; });
     phase.pushed = sum(e_, [](const BasePhase& of) { return of.pushed; });
     phase.duration_s = until_s - time_s_;

@@ -22,6 +22,7 @@ namespace unflex::verify {
 // Both axes during a time in which neither changes its acceleration.
 struct BasePhase {
   dynamics::BaseXY xy;
+  dynamics::BaseSegment z = {};
   // Filament that comes out meanwhile, counted from the start of the move or of the shaped motion.
   dynamics::BaseSegment e = {};
   // Filament that the extruder pushes in moves of X or Y, without wipes. It may draw some back

@@ -5,7 +5,9 @@
 namespace unflex::verify {
 namespace {
 
-Deviation deviation(const Meter& meter) { return {meter.extruding().stats(), meter.all().stats()}; }
+Deviation deviation(const Meter& meter) {
+  return {meter.extruding().stats(), meter.all().stats(), meter.height()};
+}
 
 PlayedFile played(Meter& meter, const Track& track) {
   meter.line()->finish();

@@ -44,7 +44,8 @@ Path nozzle_path(const std::vector<planner::PlannedMove>& moves, const Setup& se
   const std::size_t nodes = node_grid(moves, setup).count;
   const WindowSpan span{0, nodes - 1, 0, nodes - 1};
   RunWindow window = windows(moves, {span}, testing::at_rest(moves), setup).front();
-  auto [x, y] = solve(*make_banded_engine(), span, window);
+  const Axes<Result<AxisSolution>> solved = solve(*make_banded_engine(), span, window);
+  const auto& [x, y] = solved;
   const auto place = [&](const Result<AxisSolution>& solution, double factor) {
     std::vector<double> places;
     const dynamics::FlexibleAxis axis = kAxis.detuned(factor);
@@ -222,7 +223,8 @@ TEST(ContourWindow, IsAProblemOfEachAxisThatBothEnginesSolveAlike) {
   const std::size_t nodes = node_grid(moves, setup).count;
   const WindowSpan span{0, nodes - 1, 0, nodes - 1};
   RunWindow window = windows(moves, {span}, testing::at_rest(moves), setup).front();
-  const auto [x, y] = solve(*make_banded_engine(), span, window);
+  const Axes<Result<AxisSolution>> solved = solve(*make_banded_engine(), span, window);
+  const auto& [x, y] = solved;
   const Result<AxisSolution> by_ipopt = make_ipopt_engine()->solve(window.x);
   ASSERT_TRUE(x && y && by_ipopt);
   EXPECT_NEAR(x->objective, by_ipopt->objective, 1e-4 * by_ipopt->objective);

@@ -99,5 +99,26 @@ TEST(BeltsThatDiffer, MakeTheSameTextForAnyNumberOfWorkers) {
   EXPECT_EQ(made(belts(36.0), 1).text, made(belts(36.0), 3).text);
 }
 
+// Tool of 300 g, carriages of 200 g, drives of 40 N/mm: X moves the nozzle in Z.
+TEST(ATripteron, IsCompensatedInZToo) {
+  Overrides tripteron = {"kinematics.type=tripteron", "dynamics.of=masses",
+                         "dynamics.tool_mass_g=300", "dynamics.freq_error=0"};
+  for (const char* const motor : {"a", "b", "c"}) {
+    for (const char* const key :
+         {".carriage_mass_g=200", ".stiffness_n_mm=40", ".damping_n_s_mm=0.0142"}) {
+      tripteron.push_back(std::string("dynamics.") + motor + key);
+    }
+  }
+  const Made whole = made(tripteron);
+  const verify::Measured& measured = whole.report.measured;
+  ASSERT_TRUE(measured.compensated.height && measured.uncompensated.height);
+  // The sliced print has the printer's shaper, MZV.
+  EXPECT_LE(rms_mm(whole.report), 0.3 * measured.uncompensated.extruding.contour_rms_mm);
+  EXPECT_LE(measured.compensated.height->rms_mm, 0.3 * measured.uncompensated.height->rms_mm);
+  EXPECT_GT(measured.uncompensated.height->rms_mm, 1e-3);
+  EXPECT_NE(whole.text.find(" Z0."), std::string::npos);
+  EXPECT_EQ(made(tripteron, 3).text, whole.text);
+}
+
 }  // namespace
 }  // namespace unflex::flow

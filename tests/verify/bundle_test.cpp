@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Dense>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -87,84 +88,107 @@ TEST(Bundle, StepsAsRungeAndKuttaDo) {
   }
 }
 
-// Modes that lie along no axis. The masses' own equation, by RK4 in X and Y with finer steps:
+// Modes that lie along no axis. The masses' own equation, by RK4 in X, Y and Z with finer steps:
 // M p̈ = C (ḃ − ṗ) + K (b − p). The base leaps to another velocity halfway.
+class MassesByThemselves {
+ public:
+  using Vector = dynamics::ModeFrame::Vector;
+
+  MassesByThemselves(const dynamics::ModeFrame::Masses& masses, const Vector& place_mm)
+      : masses_(masses), p_(place_mm) {}
+
+  void step(const std::array<dynamics::BaseSegment, 3>& base, double t, double h) {
+    const auto [v1, a1] = rates(base, t, p_, v_);
+    const auto [v2, a2] = rates(base, t + 0.5 * h, plus(p_, v1, 0.5 * h), plus(v_, a1, 0.5 * h));
+    const auto [v3, a3] = rates(base, t + 0.5 * h, plus(p_, v2, 0.5 * h), plus(v_, a2, 0.5 * h));
+    const auto [v4, a4] = rates(base, t + h, plus(p_, v3, h), plus(v_, a3, h));
+    for (std::size_t i = 0; i < 3; ++i) {
+      p_[i] += h / 6.0 * (v1[i] + 2.0 * v2[i] + 2.0 * v3[i] + v4[i]);
+      v_[i] += h / 6.0 * (a1[i] + 2.0 * a2[i] + 2.0 * a3[i] + a4[i]);
+    }
+  }
+  [[nodiscard]] const Vector& place_mm() const { return p_; }
+  [[nodiscard]] const Vector& velocity_mm_s() const { return v_; }
+
+ private:
+  static Vector plus(Vector a, const Vector& b, double times) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      a[i] += times * b[i];
+    }
+    return a;
+  }
+  std::pair<Vector, Vector> rates(const std::array<dynamics::BaseSegment, 3>& base, double t,
+                                  const Vector& p, const Vector& v) const {
+    Eigen::Vector3d force = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d mass;
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        const auto [a, b] = std::pair(static_cast<std::size_t>(i), static_cast<std::size_t>(j));
+        const dynamics::BaseSegment& of = base[b];
+        const double ahead = of.position + t * (of.velocity + 0.5 * of.acceleration * t) - p[b];
+        const double faster = of.velocity + t * of.acceleration - v[b];
+        mass(i, j) = masses_.mass_kg[a][b];
+        force(i) +=
+            1e3 * (masses_.stiffness_n_mm[a][b] * ahead + masses_.damping_n_s_mm[a][b] * faster);
+      }
+    }
+    const Eigen::Vector3d accel = mass.inverse() * force;
+    return {v, {accel(0), accel(1), accel(2)}};
+  }
+
+  dynamics::ModeFrame::Masses masses_;
+  Vector p_;
+  Vector v_{};
+};
+
 TEST(Bundle, MovesNozzlesWhoseModesAreNotTheAxes) {
   constexpr double kShare_s = 4e-4;
   dynamics::ModeFrame::Masses masses;
-  masses.mass_kg = {{{0.4, 0.05, 0.0}, {0.05, 0.7, 0.0}, {0.0, 0.0, 1.0}}};
-  masses.stiffness_n_mm = {{{70.0, 10.0, 0.0}, {10.0, 70.0, 0.0}, {0.0, 0.0, 0.0}}};
-  for (std::size_t i = 0; i < 2; ++i) {
-    for (std::size_t j = 0; j < 2; ++j) {
+  masses.mass_kg = {{{0.7, 0.0, -0.1}, {0.0, 0.7, 0.05}, {-0.1, 0.05, 0.9}}};
+  masses.stiffness_n_mm = {{{120.0, 6.0, -40.0}, {6.0, 80.0, 0.0}, {-40.0, 0.0, 120.0}}};
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
       masses.damping_n_s_mm[i][j] = kShare_s * masses.stiffness_n_mm[i][j];
     }
   }
   NozzleModel model;
   model.frame = dynamics::ModeFrame::of(masses).value();
-  model.x = dynamics::from_frequency(70.0, 0.05);
+  model.x = dynamics::from_frequency(80.0, 0.05);
   model.y = model.x;
   Bundle bundle({model, model});
   bundle.shift({100.0, 50.0});
-  std::array<double, 4> state = {100.0, 50.0, 0.0, 0.0};
-  dynamics::BaseXY base{{100.0, 20.0, 3000.0}, {50.0, -30.0, -4000.0}};
-  const auto rate = [&](const std::array<double, 4>& s, double t) {
-    std::array<double, 2> force{};
-    for (std::size_t j = 0; j < 2; ++j) {
-      const dynamics::BaseSegment& b = base[j];
-      const double ahead = b.position + t * (b.velocity + 0.5 * b.acceleration * t) - s[j];
-      const double faster = b.velocity + t * b.acceleration - s[2 + j];
-      for (std::size_t i = 0; i < 2; ++i) {
-        force[i] += 1e3 * masses.stiffness_n_mm[i][j] * (ahead + kShare_s * faster);
-      }
-    }
-    const auto& m = masses.mass_kg;
-    const double determinant = m[0][0] * m[1][1] - m[0][1] * m[1][0];
-    return std::array<double, 4>{s[2], s[3],
-                                 (m[1][1] * force[0] - m[0][1] * force[1]) / determinant,
-                                 (m[0][0] * force[1] - m[1][0] * force[0]) / determinant};
-  };
+  MassesByThemselves alone(masses, {100.0, 50.0, 7.0});
+  std::array<dynamics::BaseSegment, 3> base = {
+      {{100.0, 20.0, 3000.0}, {50.0, -30.0, -4000.0}, {7.0, 1.0, 500.0}}};
   constexpr double kH_s = 5e-4;
   constexpr int kFiner = 20;
   for (int step = 0; step < 40; ++step) {
     if (step == 20) {
-      base.x.velocity -= 15.0;
+      base[0].velocity -= 15.0;
     }
     bundle.begin_steps(1.0, kH_s);
-    bundle.step(base);
-    const double h = kH_s / kFiner;
+    bundle.step({base[0], base[1]}, base[2]);
     for (int i = 0; i < kFiner; ++i) {
-      const double t = i * h;
-      const auto plus = [&](const std::array<double, 4>& k, double dt) {
-        std::array<double, 4> next = state;
-        for (std::size_t n = 0; n < 4; ++n) {
-          next[n] += dt * k[n];
-        }
-        return next;
-      };
-      const auto k1 = rate(state, t);
-      const auto k2 = rate(plus(k1, 0.5 * h), t + 0.5 * h);
-      const auto k3 = rate(plus(k2, 0.5 * h), t + 0.5 * h);
-      const auto k4 = rate(plus(k3, h), t + h);
-      for (std::size_t n = 0; n < 4; ++n) {
-        state[n] += h / 6.0 * (k1[n] + 2.0 * k2[n] + 2.0 * k3[n] + k4[n]);
-      }
+      alone.step(base, i * kH_s / kFiner, kH_s / kFiner);
     }
-    for (dynamics::BaseSegment* axis : {&base.x, &base.y}) {
-      axis->position += kH_s * (axis->velocity + 0.5 * axis->acceleration * kH_s);
-      axis->velocity += kH_s * axis->acceleration;
+    for (dynamics::BaseSegment& axis : base) {
+      axis.position += kH_s * (axis.velocity + 0.5 * axis.acceleration * kH_s);
+      axis.velocity += kH_s * axis.acceleration;
     }
     for (const std::size_t number : {0U, 1U}) {
       const dynamics::NozzleMotionXY found = bundle.motion(number);
-      ASSERT_NEAR(found.x.position, state[0], 5e-6) << step;
-      ASSERT_NEAR(found.y.position, state[1], 5e-6) << step;
-      ASSERT_NEAR(found.x.velocity, state[2], 3e-3) << step;
-      ASSERT_NEAR(found.y.velocity, state[3], 3e-3) << step;
+      ASSERT_NEAR(found.x.position, alone.place_mm()[0], 5e-6) << step;
+      ASSERT_NEAR(found.y.position, alone.place_mm()[1], 5e-6) << step;
+      ASSERT_NEAR(found.x.velocity, alone.velocity_mm_s()[0], 4e-3) << step;
+      ASSERT_NEAR(found.y.velocity, alone.velocity_mm_s()[1], 4e-3) << step;
+      ASSERT_NEAR(base[2].position + bundle.above_mm(number), alone.place_mm()[2], 5e-6) << step;
     }
   }
-  EXPECT_FALSE(bundle.rest_on(base));
-  bundle.ride_on(base);
-  EXPECT_TRUE(bundle.rest_on(base));
-  EXPECT_EQ(bundle.motion(1).y.position, base.y.position);
+  const dynamics::BaseXY xy{base[0], base[1]};
+  EXPECT_FALSE(bundle.rest_on(xy));
+  bundle.ride_on(xy);
+  EXPECT_TRUE(bundle.rest_on(xy));
+  EXPECT_EQ(bundle.motion(1).y.position, xy.y.position);
 }
 
 // The states stay, and from then on the nozzles move as those of the slower models.

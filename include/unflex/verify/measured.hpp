@@ -22,11 +22,19 @@ struct DeviationStats {
   std::size_t contour_max_line = 0;  // nearest to the largest contour error
 };
 
+// How far the nozzle is above or below its plan while filament is laid.
+struct HeightStats {
+  double max_mm = 0.0;
+  double rms_mm = 0.0;
+};
+
 struct Deviation {
   DeviationStats extruding;  // while the text that is played lays filament
   // While the reference moves in X or Y. For a whole file, also while the base is held after its
   // end.
   DeviationStats all;
+  // Set where modes move the nozzle in Z, too.
+  std::optional<HeightStats> height = {};
 };
 
 // How far the nozzle passes from the corners of the path. All corners have the same weight.

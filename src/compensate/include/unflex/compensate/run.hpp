@@ -8,6 +8,7 @@
 #include <array>
 #include <cstddef>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -32,6 +33,15 @@ struct AxisSetup {
   // Position limits may be widened per run to where the sliced path itself goes.
   BaseLimits limits;
   dynamics::ShaperPulses pulses;  // of the second stage (second_stage.hpp); empty: there is none
+};
+
+// The motors of modes, and their limits: |Σ_j g_ij β̈_j| ≤ A. The limits of each AxisSetup are those
+// that it has while the others rest.
+struct ModeMotors {
+  dynamics::ModeFrame::Matrix by_modes{};  // g, motors by modes
+  double max_velocity_mm_s = std::numeric_limits<double>::infinity();
+  double max_accel_mm_s2 = std::numeric_limits<double>::infinity();
+  double max_z_accel_mm_s2 = std::numeric_limits<double>::infinity();  // the firmware's, of Z
 };
 
 // Models that X and Y may have at the same time, by their numbers in AxisWindow.
@@ -67,9 +77,11 @@ struct Setup : Axes<AxisSetup> {
   double end_weight = 0.0;         // least w around the end of a run
   double jerk_weight = 1.5;        // ρ / (h⁶ (ωh)⁴)
   std::optional<Contour> contour;  // unset: the nozzle shall be where r is at the time
-  // The machine's modes, where they do not lie along the axes, and Z is rigid. X and Y are then
-  // modes 0 and 1 (dynamics/mode_frame.hpp), and there is no contour. A nozzle is a swing.
+  // The machine's modes, where they do not lie along the axes (dynamics/mode_frame.hpp). X and Y
+  // are then modes 0 and 1, `third` is mode 2 unless that is rigid, and there is no contour.
   std::shared_ptr<const dynamics::ModeFrame> frame;
+  std::optional<AxisSetup> third;
+  std::optional<ModeMotors> motors;  // set with `third`: the limits of the motors of all modes
 
   // Whether the base is to suit more models than the axes as given.
   [[nodiscard]] bool is_robust() const {
@@ -147,6 +159,8 @@ struct RunWindow : Axes<AxisWindow> {
   std::optional<Contour> contour = {};
   std::vector<PathVertex> path = {};
   std::shared_ptr<const dynamics::ModeFrame> frame = {};  // as in Setup
+  std::optional<AxisWindow> third = {};                   // mode 2
+  std::optional<ModeMotors> motors = {};
 };
 
 // The problems of all windows, on the nodes of node_grid(). nozzle: its position and velocity when
@@ -164,7 +178,10 @@ struct RunWindow : Axes<AxisWindow> {
 // The solution for one axis of a cruise: the reference.
 [[nodiscard]] AxisSolution along(const AxisWindow& window);
 
-using AxisSolutions = Axes<Result<AxisSolution>>;
+struct AxisSolutions : Axes<Result<AxisSolution>> {
+  std::optional<Result<AxisSolution>> third = {};  // of RunWindow::third
+};
+
 // Solves X and Y of a window by the engine. In a cruise the solution is the reference. With a
 // contour the window gets aims and weights, and if the axes share motors it gets limits at the
 // nodes. Under these each axis by itself has this solution.
@@ -176,9 +193,12 @@ using AxisSolutions = Axes<Result<AxisSolution>>;
     const Engine& engine, const std::vector<WindowSpan>& spans, std::vector<RunWindow>& windows,
     const std::function<void(const AxisSolution&)>& each = nullptr);
 
-// The base as it moves in X and Y, where it was found in these modes.
+// The base as it moves in the axes, where it was found in these modes. third: that of mode 2, if
+// that is not rigid. Where Z would accelerate by more than max_z_accel_mm_s2, it goes less far.
 [[nodiscard]] dynamics::BaseTrajectory in_axes(const dynamics::ModeFrame& frame,
-                                               const dynamics::BaseTrajectory& in_modes);
+                                               const dynamics::BaseTrajectory& in_modes,
+                                               const std::optional<dynamics::AxisTrajectory>& third,
+                                               double max_z_accel_mm_s2);
 
 // Makes each axis of a window a problem of its own, as solve() does, for an engine that solves it
 // elsewhere. divider: the engine that solves here what the division into such problems needs.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "unflex/core/axes.hpp"
@@ -36,6 +37,8 @@ struct AxisMotion {
 
 struct BaseTrajectory : Axes<AxisTrajectory> {
   double period_s = 0.0;  // h
+  // How far the base is above the plan, where it makes up for modes that move the nozzle in Z.
+  std::optional<AxisTrajectory> above = {};
 
   [[nodiscard]] std::size_t nodes() const { return x.position_mm.size(); }
   [[nodiscard]] double duration_s() const { return static_cast<double>(nodes() - 1) * period_s; }

@@ -74,6 +74,7 @@ struct TimingSearch {
 struct RunWindows {
   std::vector<compensate::WindowSpan> spans;
   std::vector<Axes<AxisResult>> results;  // X and Y, one per span
+  std::vector<AxisResult> thirds;         // mode 2, one per span, if the setup has one
   std::atomic<std::size_t> unsolved = 0;  // axes of windows
   std::vector<Probe> probes;
 };
