@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "unflex/core/firmware_spec.hpp"
+#include "unflex/machine/as_printer.hpp"
 #include "unflex/planner/printer_shaper.hpp"
 #include "unflex/run/verify_rules.hpp"
 
@@ -39,6 +40,24 @@ std::string origin_of_axis(const machine::Settings& settings, const std::string&
     }
   }
   return std::string(machine::kDefaultOrigin);
+}
+
+// Adds the axes of a machine with one tool. Each value is the tool's, whose keys begin so, or the
+// printer's.
+void add_axes(const machine::Settings& settings, const std::string& tool, std::string_view name,
+              report::PrinterFacts& facts) {
+  for_each_axis(
+      [&](std::string_view letter, std::string_view key, const machine::AxisDynamics& axis) {
+        std::string origin =
+            tool.empty() ? std::string(machine::kDefaultOrigin)
+                         : origin_of(settings, fmt::format("{}dynamics.{}.freq_hz", tool, key));
+        if (origin == machine::kDefaultOrigin) {
+          origin = origin_of_axis(settings, std::string(key));
+        }
+        facts.axes.push_back(
+            {fmt::format("{}{}", name, letter), axis.description(), std::move(origin)});
+      },
+      kAxisLetters, kAxisKeys, settings.dynamics);
 }
 
 std::string travel_text(const machine::PrinterSettings& printer) {
@@ -85,12 +104,14 @@ std::optional<record::PrinterShaper> printer_shaper(const verify::Rules& rules) 
 
 report::PrinterFacts printer_facts(const machine::Settings& settings) {
   report::PrinterFacts facts;
-  for_each_axis(
-      [&](std::string_view letter, std::string_view key, const machine::AxisDynamics& axis) {
-        facts.axes.push_back(
-            {std::string(letter), axis.description(), origin_of_axis(settings, std::string(key))});
-      },
-      kAxisLetters, kAxisKeys, settings.dynamics);
+  // A print begins with tool 0, so the printer's own axes count only if no such tool is told of.
+  if (settings.tools.empty() || settings.tools.front().number != 0) {
+    add_axes(settings, {}, "", facts);
+  }
+  for (const machine::ToolSettings& tool : settings.tools) {
+    add_axes(machine::with_tool(settings, tool.number), fmt::format("tool.{}.", tool.number),
+             fmt::format("T{} ", tool.number), facts);
+  }
   if (const auto own = printer_shaper(run::verify_rules(settings))) {
     facts.shaper = own->name;
   }

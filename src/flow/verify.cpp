@@ -88,8 +88,16 @@ std::unique_ptr<record::Recorder> recorder_for(const Job& job, const verify::Rul
 }
 
 verify::Observation observation_of(record::Recorder& recorder, const verify::Rules& rules) {
-  verify::Observation observation{verify::detuned(rules.nozzle), &recorder.observer()};
-  observation.detuned.insert(observation.detuned.end(), rules.plants.begin(), rules.plants.end());
+  const auto with_plants = [](const verify::NozzleModel& nozzle,
+                              const std::vector<verify::NozzleModel>& plants) {
+    std::vector<verify::NozzleModel> others = verify::detuned(nozzle);
+    others.insert(others.end(), plants.begin(), plants.end());
+    return others;
+  };
+  verify::Observation observation{with_plants(rules.nozzle, rules.plants), &recorder.observer()};
+  for (const verify::ToolModel& tool : rules.tools) {
+    observation.detuned_by_tool.push_back(with_plants(tool.nozzle, tool.plants));
+  }
   return observation;
 }
 

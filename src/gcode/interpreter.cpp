@@ -15,6 +15,7 @@
 #include "firmware_reader.hpp"
 #include "unflex/core/firmware_spec.hpp"
 #include "unflex/core/number.hpp"
+#include "unflex/gcode/hotend_command.hpp"
 
 namespace unflex::gcode {
 namespace {
@@ -87,6 +88,7 @@ void Event::reset() {
   waits_for_buffer = false;
   warnings.clear();
   added = false;
+  tool.reset();
 }
 
 Event Interpreter::interpret(Line line) {
@@ -100,8 +102,13 @@ void Interpreter::interpret(Event& event) {
   event.reset();
   const std::string_view content = event.line.content();
   parse(content, command_);
+  // Reading a line of several commands changes command_.
+  const std::optional<int> tool = selected_tool(command_, options_.firmware);
   const std::array<bool, 4> known = state_.known;
   (this->*reader_of(options_.firmware).read)(event, content);
+  if (tool && *tool >= 0) {
+    event.tool = tool;
+  }
   if (event.position_lost && is_motion(command_)) {
     note_lost_motion(event, known);
   }

@@ -4,6 +4,8 @@
 #include <array>
 #include <functional>
 #include <numbers>
+#include <utility>
+#include <vector>
 
 #include "unflex/core/firmware_spec.hpp"
 #include "unflex/core/xy.hpp"
@@ -64,6 +66,45 @@ dynamics::FrequencyField frequency_field(const AxisDynamics& dynamics) {
 dynamics::FlexibleAxis behind(const dynamics::FlexibleAxis& axis, double freq_hz,
                               double damping_ratio) {
   return freq_hz > 0.0 ? axis.followed_by(2.0 * std::numbers::pi * freq_hz, damping_ratio) : axis;
+}
+
+Settings with_tool(Settings settings, int number) {
+  const std::vector<ToolSettings> tools = std::exchange(settings.tools, {});
+  const auto found = std::ranges::find(tools, number, &ToolSettings::number);
+  if (found == tools.end()) {
+    return settings;
+  }
+  for_each_axis(
+      [](AxisDynamics& axis, const std::optional<double>& freq_hz,
+         const std::optional<double>& damping_ratio) {
+        if (freq_hz || damping_ratio) {
+          axis.modes.clear();
+          axis.plants.clear();
+        }
+        // A map tells shares of freq_hz.
+        const double share = freq_hz.value_or(axis.freq_hz) / axis.freq_hz;
+        for (FrequencyMap& map : axis.map) {
+          for (double& hz : map.freq_hz) {
+            hz *= share;
+          }
+        }
+        axis.freq_hz = freq_hz.value_or(axis.freq_hz);
+        axis.damping_ratio = damping_ratio.value_or(axis.damping_ratio);
+      },
+      settings.dynamics, found->freq_hz, found->damping_ratio);
+  for_each_axis(
+      [&](AxisDynamics& axis) {
+        for (FrequencyMap& map : axis.map) {
+          const double offset_mm = map.along == 'x'   ? found->offset_mm.x
+                                   : map.along == 'y' ? found->offset_mm.y
+                                                      : 0.0;
+          for (double& place_mm : map.at_mm) {
+            place_mm += offset_mm;
+          }
+        }
+      },
+      settings.dynamics);
+  return settings;
 }
 
 // At the place that by_place is for, the product of all maps over the bed is by_place times the
@@ -128,9 +169,16 @@ gcode::InterpreterOptions interpreter_options(const Settings& settings) {
   options.has_print_jerk = settings.has_print_jerk();
   options.filament_diameter_mm = settings.extruder.filament_diameter_mm;
   options.steps_per_mm = settings.steps_per_mm();
-  const double settling_s = most_of_axes(
-      [](const dynamics::FlexibleAxis& axis) { return axis.settling_s(); }, nozzle_axes(settings));
-  options.settling_s = std::min(settling_s, kLongestCalm_s);
+  const auto settling_s = [](const Settings& of) {
+    return most_of_axes([](const dynamics::FlexibleAxis& axis) { return axis.settling_s(); },
+                        nozzle_axes(of));
+  };
+  double longest_s = settling_s(settings);
+  for (const ToolSettings& tool : settings.tools) {
+    options.tools.push_back(tool.number);
+    longest_s = std::max(longest_s, settling_s(with_tool(settings, tool.number)));
+  }
+  options.settling_s = std::min(longest_s, kLongestCalm_s);
   if (settings.writes_pressure() && settings.printer_presses()) {
     options.advance_of_runs = gcode::RunAdvance::on;
     options.begins_advanced = settings.pressure.advance_s.value_or(0.0) > 0.0 ||

@@ -9,6 +9,7 @@
 #include "key_table.hpp"
 #include "key_values.hpp"
 #include "suggestion.hpp"
+#include "tool_keys.hpp"
 #include "unflex/core/number.hpp"
 
 namespace unflex::machine {
@@ -378,6 +379,9 @@ std::string store(const Value& value, const Key& key, std::vector<FrequencyMap>&
 
 std::string assign(const std::string& name, const Value& value, const SourcePlace& place,
                    Draft& draft) {
+  if (is_of_tool(name)) {
+    return assign_to_tool(name, value, place, draft);
+  }
   const std::optional<std::size_t> index = find_key(name);
   if (!index) {
     return is_section(name) ? fmt::format("'{}' is a section, not a key", name)

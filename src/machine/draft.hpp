@@ -2,8 +2,10 @@
 // place each key was given at.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "unflex/core/error.hpp"
@@ -26,8 +28,11 @@ inline constexpr double kMostDamping = 0.5;
   return ratio >= kLeastDamping && ratio <= kMostDamping;
 }
 
+// The section that all keys of tools begin with.
+inline constexpr std::string_view kToolSection = "tool";
+
 // A remark for the user, and the keys that it is about. If other places give all of these keys, it
-// is not told.
+// is not told. kToolSection stands for any key of a tool.
 struct Note {
   Diagnostic diagnostic;
   std::vector<std::string> keys;
@@ -39,6 +44,7 @@ struct Draft {
   Axes<MassSpringDamper> mass;
   // Parallel to key_table(): where the key was given last; empty while it has its default.
   std::vector<std::optional<SourcePlace>> places;
+  std::map<std::string, SourcePlace> tool_places;  // where each key of a tool was given last
   std::string printer_file;  // the name it goes by in messages; empty if none is given
   // The end of a message about a missing setting, if the printer file names other files that could
   // not be read.

@@ -17,6 +17,7 @@
 #include "slicer_reader.hpp"
 #include "source_kind.hpp"
 #include "toml_reader.hpp"
+#include "tool_keys.hpp"
 #include "unflex/core/firmware_spec.hpp"
 #include "unflex/core/utf8.hpp"
 #include "unflex/machine/machine.hpp"
@@ -60,6 +61,11 @@ void record_origins(Draft& draft) {
           key.name, is_of_modes(draft, key.name)
                         ? std::string(key.name.substr(0, key.name.rfind('.'))) + std::string(kModes)
                         : origin_text(draft.places[i]));
+    }
+  }
+  for (const ToolSettings& tool : draft.settings.tools) {
+    for (const ToolRow& row : rows_of(tool)) {
+      draft.settings.origins.emplace_back(row.key, origin_text(draft.tool_places.at(row.key)));
     }
   }
 }
@@ -118,7 +124,8 @@ void note_unknown_resonances(Draft& draft) {
   for_each_axis(
       [&](std::string_view letter, std::string_view axis, const AxisDynamics& dynamics) {
         const std::string key = dynamics_key(axis, "freq_hz");
-        if (!draft.places[*find_key(key)] && dynamics.modes.empty()) {
+        if (!draft.places[*find_key(key)] && dynamics.modes.empty() &&
+            !tell_frequency(draft.settings.tools, axis == kAxisKeys.x ? 0 : 1)) {
           axes.push_back(letter);
           overrides.push_back(fmt::format("--set {}=...", key));
         }
@@ -216,6 +223,9 @@ bool is_known(const Note& note, const Draft& draft) {
     return place && (place->file != noted.file || place->line > noted.line);
   };
   const auto given_by_others = [&](const std::string& key) {
+    if (key == kToolSection) {
+      return !draft.settings.tools.empty();
+    }
     // Modes tell of frequency and damping, too.
     const std::string modes = fmt::format("{}{}", section_of(key), kModes);
     return has_other_place(key) ||
@@ -312,7 +322,8 @@ Result<Settings> finish(Draft draft) {
       !resolved) {
     return tl::unexpected(resolved.error());
   }
-  if (Status checked = check_consistency(draft); !checked) {
+  if (Status checked = check_consistency(draft).and_then([&] { return check_tools(draft); });
+      !checked) {
     return tl::unexpected(checked.error());
   }
   judge_variant(draft);
@@ -384,6 +395,13 @@ std::string toml_line(const Key& key, std::string_view name, const std::string& 
                : fmt::format("# {} is unset: {}\n", name, key.if_unset);
 }
 
+// The origin of a key that is not in the table; empty: not known.
+std::string origin_of(const Settings& settings, std::string_view key) {
+  const auto found =
+      std::ranges::find(settings.origins, key, &std::pair<std::string, std::string>::first);
+  return found == settings.origins.end() ? std::string{} : found->second;
+}
+
 }  // namespace
 
 std::string to_toml(const Settings& settings) {
@@ -414,6 +432,15 @@ std::string to_toml(const Settings& settings) {
     }
     text += toml_line(key, key.name.substr(section.size() + 1), origin, draft);
   }
+  for (const ToolSettings& tool : settings.tools) {
+    const std::string tool_section = fmt::format("tool.{}", tool.number);
+    text += fmt::format("\n[{}]\n", tool_section);
+    for (const auto& [key, value] : rows_of(tool)) {
+      const std::string origin = origin_of(settings, key);
+      text += fmt::format("{} = {}{}\n", key.substr(tool_section.size() + 1), value,
+                          origin.empty() ? "" : "  # " + printable(origin));
+    }
+  }
   return text;
 }
 
@@ -433,6 +460,11 @@ std::vector<SettingRow> rows(const Settings& settings) {
     rows.push_back({.key = std::string(key.name),
                     .value = value_in_force(key, draft).value_or(""),
                     .origin = origin});
+  }
+  for (const ToolSettings& tool : settings.tools) {
+    for (const auto& [key, value] : rows_of(tool)) {
+      rows.push_back({.key = key, .value = value, .origin = origin_of(settings, key)});
+    }
   }
   return rows;
 }

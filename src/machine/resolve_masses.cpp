@@ -68,6 +68,11 @@ Status check_drives(const Draft& draft) {
                                   key));
     }
   }
+  if (!s.tools.empty()) {
+    return conflict(draft, {"dynamics.of"},
+                    "dynamics.of is \"masses\", which does not go with tools of their own yet; "
+                    "remove the sections [tool.*]");
+  }
   const Motors motors = s.motors();
   for (std::size_t i = 0; i < kDrives.size(); ++i) {
     const std::string key = fmt::format("dynamics.{}.stiffness_n_mm", kDrives[i]);

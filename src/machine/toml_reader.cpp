@@ -9,6 +9,7 @@
 #include "assign.hpp"
 #include "key_table.hpp"
 #include "suggestion.hpp"
+#include "tool_keys.hpp"
 #include "unflex/core/number.hpp"
 
 namespace unflex::machine {
@@ -70,7 +71,10 @@ struct Entry {
   const toml::node* node = nullptr;
 };
 
-std::string check_section(const std::string& name) {
+std::string open_section(const std::string& name, Draft& draft) {
+  if (is_of_tool(name)) {
+    return open_tool_section(name, draft);
+  }
   return is_section(name) ? std::string{}
                           : fmt::format("unknown section '{}'{}", name, suggest_section(name));
 }
@@ -80,7 +84,7 @@ void flatten(const toml::table& table, const std::string& prefix, std::vector<En
     const std::string name = prefix + std::string(key.str());
     entries.push_back({name, &node});
     const toml::table* const inner = node.as_table();
-    if (inner != nullptr && is_section(name)) {
+    if (inner != nullptr && (is_section(name) || is_tool_section(name))) {
       flatten(*inner, name + ".", entries);
     }
   }
@@ -99,7 +103,7 @@ Status store_all(const toml::table& table, const std::string& name, Draft& draft
     const SourcePlace place{name, line_of(*entry.node)};
     const bool section = entry.node->is_table() && !find_key(entry.name);
     std::string wrong =
-        section ? check_section(entry.name) : store(*entry.node, entry.name, place, draft);
+        section ? open_section(entry.name, draft) : store(*entry.node, entry.name, place, draft);
     if (!wrong.empty()) {
       return fail(ErrorKind::usage, place, std::move(wrong));
     }

@@ -4,6 +4,7 @@
 
 #include "key_values.hpp"
 #include "toml_reader.hpp"
+#include "tool_keys.hpp"
 #include "unflex/machine/machine.hpp"
 #include "validate.hpp"
 
@@ -25,7 +26,16 @@ Status Settings::validate() const {
       return fail(ErrorKind::usage, read.error().message);
     }
   }
-  return resolve_dynamics(own).and_then([&] { return check_consistency(own); });
+  for (const ToolSettings& tool : tools) {
+    for (const auto& [key, value] : rows_of(tool)) {
+      if (const Status read = apply_override(fmt::format("{}={}", key, value), again); !read) {
+        return fail(ErrorKind::usage, read.error().message);
+      }
+    }
+  }
+  return resolve_dynamics(own).and_then([&] { return check_consistency(own); }).and_then([&] {
+    return check_tools(own);
+  });
 }
 
 }  // namespace unflex::machine

@@ -38,7 +38,8 @@ machine::MachineState state_in_middle(const Piece& run, double filament_g_per_mm
         sum_mm_s + 0.5 * move.duration_s() * (xy_of(segment.start_mm) + xy_of(segment.end_mm));
   }
   return {filament_g_per_mm * 0.5 * (begin[gcode::E] + end[gcode::E]),
-          0.5 * (begin[gcode::Z] + end[gcode::Z]), sum_mm_s / planner::duration_s(run.moves)};
+          0.5 * (begin[gcode::Z] + end[gcode::Z]), sum_mm_s / planner::duration_s(run.moves),
+          run.tool};
 }
 
 }  // namespace
@@ -47,6 +48,7 @@ Admission::Admission(MachineModel& machine, std::string input_name,
                      const std::vector<verify::BlamedRun>& kept, report::Report& report)
     : machine_(&machine),
       rules_(machine.at({})),
+      tool_(machine.as_given().settings.tools.empty() ? std::optional(0) : std::nullopt),
       input_name_(std::move(input_name)),
       kept_(&kept),
       report_(&report),
@@ -86,6 +88,12 @@ void Admission::admit(RunJob& job) {
 }
 
 void Admission::keep_lines(RunJob& job) {
+  if (job.piece.tool != tool_) {
+    tool_ = job.piece.tool;
+    rules_ = machine_->at({.tool = job.piece.tool});
+    job.rules = rules_;
+    nozzle_.set_model(rules_->verify.nozzle);
+  }
   static_cast<void>(nozzle_.follow(job.piece));
   for (const gcode::Event& event : job.piece.events) {
     count_kept_moves(event, rules_->verify.fixed.firmware, report_->runs.kept_moves);

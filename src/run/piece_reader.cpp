@@ -12,6 +12,7 @@
 #include "unflex/core/math.hpp"
 #include "unflex/gcode/command.hpp"
 #include "unflex/gcode/compensable.hpp"
+#include "unflex/gcode/tool_check.hpp"
 #include "unflex/run/own_output.hpp"
 #include "unflex/verify/endless.hpp"
 
@@ -151,7 +152,7 @@ Result<bool> PieceReader::cut(Piece& piece) {
       }
     } else {
       const bool for_run = gcode::compensable(event, firmware_);
-      if (!open_.events.empty() && open_.is_run != for_run) {
+      if (!open_.events.empty() && (open_.is_run != for_run || open_.tool != tool_)) {
         close(piece);
         open_.is_run = for_run;
         append(std::move(event));
@@ -244,6 +245,13 @@ Result<bool> PieceReader::read_event(gcode::Event& event) {
     return true;
   }
   read_line(event);
+  const std::vector<int>& tools = interpreter_.options().tools;
+  if (Status told = gcode::check_tool(event, tools, lines_.name()); !told) {
+    return tl::unexpected(told.error());
+  }
+  if (event.tool && !tools.empty()) {
+    tool_ = *event.tool;
+  }
   travel_.add(event);
   if (Status mode = extrusion_mode_.add(event, interpreter_.state(), lines_.name()); !mode) {
     return tl::unexpected(mode.error());
@@ -289,6 +297,7 @@ void PieceReader::warn_of_long_moves(const std::vector<planner::PlannedMove>& mo
 void PieceReader::append(gcode::Event&& event) {
   if (open_.events.empty()) {
     open_.from_mm = machine_mm_;
+    open_.tool = tool_;
     open_.events.reserve(kUsualEvents);
     open_.move_counts.reserve(kUsualEvents);
     open_.features.reserve(kUsualEvents);

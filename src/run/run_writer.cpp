@@ -62,6 +62,9 @@ RunWriter::RunWriter(const RunRules& rules, std::string input_name, double max_l
 
 Result<RunWriter::Written> RunWriter::write(const RunJob& job, const RunJob* tried) {
   if (!job.piece.is_run) {
+    if (job.rules) {
+      nozzle_.set_model(job.rules->verify.nozzle);  // of another tool
+    }
     return keep_lines(job.piece);
   }
   if (tried == nullptr) {

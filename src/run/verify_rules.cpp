@@ -9,13 +9,13 @@
 namespace unflex::run {
 namespace {
 
-// The nozzle of each plant: the n-th of both axes, or the axis as given where it has fewer.
+// Nozzles of plants: the n-th has the n-th plant of both axes, or the axis as given where it has
+// fewer.
 std::vector<verify::NozzleModel> nozzles_of_plants(const machine::Settings& settings,
-                                                   const verify::NozzleModel& nominal) {
-  const std::size_t most = most_of_axes(
-      [](const machine::AxisDynamics& axis) { return axis.plants.size(); }, settings.dynamics);
-  std::vector<verify::NozzleModel> nozzles(most, nominal);
-  for (std::size_t i = 0; i < most; ++i) {
+                                                   const verify::NozzleModel& nominal,
+                                                   std::size_t count) {
+  std::vector<verify::NozzleModel> nozzles(count, nominal);
+  for (std::size_t i = 0; i < count; ++i) {
     for_each_axis(
         [&](dynamics::FlexibleAxis& nozzle, const machine::AxisDynamics& axis, double second_hz,
             double second_damping) {
@@ -29,6 +29,11 @@ std::vector<verify::NozzleModel> nozzles_of_plants(const machine::Settings& sett
   return nozzles;
 }
 
+verify::NozzleModel nozzle_of(const machine::Settings& settings) {
+  return {machine::nozzle_axes(settings), settings.verify.step_ms * 1e-3, settings.verify.hold_s,
+          machine::mode_frame(settings)};
+}
+
 verify::AxisChange change_of(const machine::AxisDynamics& axis) {
   verify::AxisChange change{axis.moving_mass_g, {}};
   for (const machine::FrequencyMap& map : axis.map) {
@@ -40,6 +45,10 @@ verify::AxisChange change_of(const machine::AxisDynamics& axis) {
     }
   }
   return change;
+}
+
+verify::MachineChange machine_change(const machine::Settings& settings) {
+  return {map_axes(change_of, settings.dynamics), settings.filament_g_per_mm()};
 }
 
 }  // namespace
@@ -61,11 +70,17 @@ verify::Rules verify_rules(const machine::Settings& settings) {
   rules.interpreter = machine::interpreter_options(settings);
   rules.limits = machine::planner_limits(settings);
   rules.fixed = machine::firmware_config(settings);
-  rules.nozzle = {machine::nozzle_axes(settings), settings.verify.step_ms * 1e-3,
-                  settings.verify.hold_s};
-  rules.nozzle.frame = machine::mode_frame(settings);
-  rules.plants = nozzles_of_plants(settings, rules.nozzle);
-  rules.change = {map_axes(change_of, settings.dynamics), settings.filament_g_per_mm()};
+  const std::size_t plants = most_of_axes(
+      [](const machine::AxisDynamics& axis) { return axis.plants.size(); }, settings.dynamics);
+  rules.nozzle = nozzle_of(settings);
+  rules.plants = nozzles_of_plants(settings, rules.nozzle, plants);
+  rules.change = machine_change(settings);
+  for (const machine::ToolSettings& tool : settings.tools) {
+    const machine::Settings own = machine::with_tool(settings, tool.number);
+    const verify::NozzleModel nozzle = nozzle_of(own);
+    rules.tools.push_back(
+        {tool.number, nozzle, nozzles_of_plants(own, nozzle, plants), machine_change(own)});
+  }
   for_each_axis(
       [](const std::optional<machine::Range>& travel, verify::TravelRange& range) {
         range.min_assumed = !travel;

@@ -29,6 +29,22 @@ const BundleKernel& bundle_kernel() {
 Bundle::Bundle(std::vector<NozzleModel> models)
     : given_(std::move(models)), models_(given_), kernel_(&bundle_kernel()) {
   arrays_.places = (models_.size() + kLanes - 1) / kLanes * kLanes;
+  make_room();
+  for (std::vector<double>* of_nozzles :
+       {&arrays_.nearest, &arrays_.now_mm2, &arrays_.before_mm2, &arrays_.mean_mm2,
+        &arrays_.largest_mm2, &all_.contour2_mm2_s, &all_.contour2_max_mm2,
+        &extruding_.contour2_mm2_s, &extruding_.contour2_max_mm2}) {
+    of_nozzles->assign(arrays_.places, 0.0);
+  }
+  arrays_.away.fill(std::vector<double>(arrays_.places));
+  arrays_.was.fill(std::vector<double>(arrays_.places));
+  take_models();
+}
+
+// Finds the largest number of modes, and has all that lies there by modes be 0.
+void Bundle::make_room() {
+  arrays_.modes = 0;
+  fastest_rad_s_ = 0.0;
   for (const NozzleModel& model : models_) {
     for_each_axis(
         [&](const dynamics::FlexibleAxis& axis) {
@@ -46,15 +62,6 @@ Bundle::Bundle(std::vector<NozzleModel> models)
   for (std::vector<double>& map : arrays_.maps) {
     map.assign(2 * parts, 0.0);
   }
-  for (std::vector<double>* of_nozzles :
-       {&arrays_.nearest, &arrays_.now_mm2, &arrays_.before_mm2, &arrays_.mean_mm2,
-        &arrays_.largest_mm2, &all_.contour2_mm2_s, &all_.contour2_max_mm2,
-        &extruding_.contour2_mm2_s, &extruding_.contour2_max_mm2}) {
-    of_nozzles->assign(arrays_.places, 0.0);
-  }
-  arrays_.away.fill(std::vector<double>(arrays_.places));
-  arrays_.was.fill(std::vector<double>(arrays_.places));
-  take_models();
 }
 
 void Bundle::take_models() {
@@ -100,6 +107,20 @@ void Bundle::set_frequencies(const Axes<double>& shares) {
   }
   take_models();
   has_maps_ = false;
+}
+
+void Bundle::set_models(const std::vector<NozzleModel>& models, const XY& base_mm) {
+  given_.assign(models.begin(), models.begin() + static_cast<std::ptrdiff_t>(count()));
+  models_ = given_;
+  shares_ = on_all_axes(1.0);
+  make_room();
+  take_models();
+  has_maps_ = false;
+  ride_on(map_axes(
+      [](double place_mm) {
+        return dynamics::BaseSegment{place_mm, 0.0, 0.0};
+      },
+      base_mm));
 }
 
 void Bundle::keep_first() {

@@ -31,6 +31,9 @@ class Bundle {
   // From now on all frequencies of an axis are this many times those of the models given, but for
   // changes of less than a ten-thousandth. The nozzles' states stay.
   void set_frequencies(const Axes<double>& shares);
+  // From now on the nozzles have these models, with the frequencies as given, and rest on a base at
+  // rest. There must be at least as many models as nozzles.
+  void set_models(const std::vector<NozzleModel>& models, const XY& base_mm);
   // Forgets all nozzles but the first, and their models.
   void keep_first();
   [[nodiscard]] const NozzleModel& model(std::size_t number = 0) const { return models_[number]; }
@@ -95,6 +98,7 @@ class Bundle {
   // Moves the swings by rk4_steps steps of RK4 while the base goes on for h seconds.
   void step_swings(const dynamics::BaseXY& base, const dynamics::BaseSegment& z, double h,
                    int rk4_steps);
+  void make_room();
   // change(axis, value, nozzle) for each axis of each nozzle.
   template <class Change, class Value>
   void change_all(const Change& change, const Axes<Value>& by);

@@ -42,8 +42,8 @@ std::vector<NozzleModel> with(const NozzleModel& model, const std::vector<Nozzle
 
 }  // namespace
 
-Meter::Meter(const NozzleModel& model, const std::vector<NozzleModel>& others)
-    : bundle_(with(model, others)), near_(verify::reach_s(model)) {}
+Meter::Meter(const NozzleModel& model, const std::vector<NozzleModel>& others, double least_reach_s)
+    : bundle_(with(model, others)), near_(std::max(verify::reach_s(model), least_reach_s)) {}
 
 void Meter::watch(Observer* observer, NozzleBase base) {
   observer_ = observer;
@@ -54,6 +54,11 @@ void Meter::watch(Observer* observer, NozzleBase base) {
 }
 
 void Meter::drop_others() { bundle_.keep_first(); }
+
+void Meter::set_models(const std::vector<NozzleModel>& models) {
+  bundle_.set_models(models, base_mm_);
+  last_look_.reset();
+}
 
 void Meter::set_machine(const MachineChange& change, const gcode::Position& at) {
   over_bed_ = change.acts_over_bed() ? &change : nullptr;

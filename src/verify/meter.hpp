@@ -92,12 +92,16 @@ class SectionError {
 // alone.
 class Meter {
  public:
-  explicit Meter(const NozzleModel& model, const std::vector<NozzleModel>& others = {});
+  // least_reach_s: of reach_s(), for models that come later.
+  explicit Meter(const NozzleModel& model, const std::vector<NozzleModel>& others = {},
+                 double least_reach_s = 0.0);
 
   // Tells the observer of every step of each nozzle.
   void watch(Observer* observer, NozzleBase base);
   // Keeps the first nozzle alone from now on.
   void drop_others();
+  // Hangs up other nozzles, at rest: Bundle::set_models().
+  void set_models(const std::vector<NozzleModel>& models);
   // From now on the frequencies are those of a machine that is at this place. Over the bed they
   // follow the base. `change` must outlive the meter.
   void set_machine(const MachineChange& change, const gcode::Position& at);

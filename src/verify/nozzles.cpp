@@ -9,8 +9,9 @@ constexpr double kSameTime_s = 1e-10;
 
 }  // namespace
 
-Nozzles::Nozzles(const NozzleModel& model, const Observation& observation, NozzleBase base)
-    : main_(model, observation.detuned), observer_(observation.observer) {
+Nozzles::Nozzles(const NozzleModel& model, const Observation& observation, NozzleBase base,
+                 double least_reach_s)
+    : main_(model, observation.detuned, least_reach_s), observer_(observation.observer) {
   main_.follow_filament();
   main_.follow_corners();
   watch_as(base);

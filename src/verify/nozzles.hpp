@@ -16,7 +16,9 @@ namespace unflex::verify {
 // The nozzle of the rules (main) and those of the observation (detuned).
 class Nozzles {
  public:
-  Nozzles(const NozzleModel& model, const Observation& observation, NozzleBase base);
+  // least_reach_s: as of Meter.
+  Nozzles(const NozzleModel& model, const Observation& observation, NozzleBase base,
+          double least_reach_s = 0.0);
 
   // From now on the observer is told that these nozzles hang on this base.
   void watch_as(NozzleBase base);
@@ -31,6 +33,12 @@ class Nozzles {
     return main_.deviation_of_other(number);
   }
 
+  // The machine stands still, and another tool has been taken: main first, then those of the
+  // observation.
+  void set_models(const std::vector<NozzleModel>& models) {
+    finish();
+    main_.set_models(models);
+  }
   // As Meter::set_machine().
   void set_machine(const MachineChange& change, const gcode::Position& at) {
     main_.set_machine(change, at);

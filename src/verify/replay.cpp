@@ -13,6 +13,7 @@
 #include "unflex/core/own_marks.hpp"
 #include "unflex/gcode/command.hpp"
 #include "unflex/gcode/compensable.hpp"
+#include "unflex/gcode/tool_check.hpp"
 #include "unflex/planner/printer_shaper.hpp"
 
 namespace unflex::verify {
@@ -157,18 +158,27 @@ void Replay::read_line() {
     }
   }
   const Regime before{interpreter_.state(), plan_.limits()};
-  if (more && *more) {
-    read_event(interpreter_.interpret(std::move(line)), before);
-  } else {
-    for_each_plan([](PlanQueue& plan) { plan.stop(); });
-    at_end_ = true;
-    Section end;
-    end.kind = SectionKind::end;
-    end.line.number = lines_read_;
-    end.regime = before;
-    end.advance = before.modal.pressure_advance;
-    push_section(std::move(end));
+  if (!more || !*more) {
+    return end_file(before);
   }
+  gcode::Event event = interpreter_.interpret(std::move(line));
+  if (const Status told = gcode::check_tool(event, interpreter_.options().tools, reader_.name());
+      !told) {
+    error_ = told.error();
+    return end_file(before);
+  }
+  read_event(std::move(event), before);
+}
+
+void Replay::end_file(const Regime& before) {
+  for_each_plan([](PlanQueue& plan) { plan.stop(); });
+  at_end_ = true;
+  Section end;
+  end.kind = SectionKind::end;
+  end.line.number = lines_read_;
+  end.regime = before;
+  end.advance = before.modal.pressure_advance;
+  push_section(std::move(end));
 }
 
 // The emitted file has the approach as a line. So it is read as a line here, too.
@@ -182,12 +192,15 @@ void Replay::read_approach(const gcode::Line& line) {
 }
 
 void Replay::read_event(gcode::Event event, const Regime& before) {
+  const int selected = event.tool.value_or(tool_);
   // Filament is pushed when the line has been read.
   const double pushed_mm = std::transform_reduce(
       event.segments.begin(), event.segments.end(), pushed_mm_, std::plus<>(),
       [](const gcode::Segment& segment) { return std::max(0.0, segment.delta(gcode::E)); });
   understand(std::move(event), before);
   pushed_mm_ = pushed_mm;
+  // Every firmware stops at such a line, so a section ends there and another one has begun.
+  tool_ = sections_.back().tool = selected;
 }
 
 void Replay::understand(gcode::Event event, const Regime& before) {
@@ -300,6 +313,7 @@ void Replay::place(gcode::Line line, const Regime& before, bool motion) {
 
 void Replay::push_section(Section section) {
   section.id = sections_.back().id + 1;
+  section.tool = tool_;
   resting_plan_.stop();
   for_each_plan([](PlanQueue& plan) { plan.end_section(); });
   sections_.push_back(std::move(section));

@@ -46,6 +46,8 @@ struct Section {
   // Pressure advance that the file has set when the section begins. For a run that was joined over
   // barriers: when its last part begins. nullopt: as the printer's configuration has it.
   gcode::PressureAdvance advance;
+  // The tool in use before the section: that of the last line that selects one. 0: none has yet.
+  int tool = 0;
   double dwell_s = 0.0;
   // barrier: for how long the machine stands still to switch its shaper or pressure advance.
   double switching_s = 0.0;
@@ -125,6 +127,7 @@ class Replay {
  private:
   [[nodiscard]] bool find_move(const PlanQueue& plan);
   void read_line();
+  void end_file(const Regime& before);
   void read_approach(const gcode::Line& line);
   void read_event(gcode::Event event, const Regime& before);
   void understand(gcode::Event event, const Regime& before);
@@ -154,6 +157,7 @@ class Replay {
   bool at_end_ = false;
   std::optional<Error> error_;
   std::size_t lines_read_ = 0;
+  int tool_ = 0;
   double pushed_mm_ = 0.0;
   std::deque<Section> sections_;  // from the current one to the one being read
   std::deque<PlacedLine> lines_;

@@ -53,6 +53,7 @@ Verifier::Verifier(std::istream& input, const std::string& input_name, std::istr
                    const std::string& output_name, const Rules& rules, Progress& progress,
                    const Observation& observation)
     : rules_(rules),
+      tools_(rules, observation),
       progress_(progress, output),
       observer_(observation.observer),
       violations_(input_name, output_name),
@@ -71,9 +72,9 @@ Verifier::Verifier(std::istream& input, const std::string& input_name, std::istr
            .output = [this](OutputMove& move) { return next_output_move(move); },
            .on_planned =
                [this](const planner::PlannedMove& move) { flow_difference_.play_sliced(move); }}),
-      original_(rules.nozzle, observation, NozzleBase::sliced),
-      kept_(coarse(rules.nozzle)),
-      emitted_(rules.nozzle, observation, NozzleBase::emitted),
+      original_(rules.nozzle, observation, NozzleBase::sliced, tools_.longest_reach_s()),
+      kept_(coarse(rules.nozzle), {}, tools_.longest_reach_s()),
+      emitted_(rules.nozzle, observation, NozzleBase::emitted, tools_.longest_reach_s()),
       run_steps_(rules.fixed, rules.steps),
       base_(rules_, violations_),
       rules_of_run_(rules_, violations_) {
@@ -174,6 +175,7 @@ void Verifier::change_machine(const planner::PlannedMove& move, Hung& nozzles) c
 }
 
 void Verifier::begin_section(bool compensated) {
+  follow_tool();
   rate_.forget();
   base_.begin_run();
   run_steps_.clear();

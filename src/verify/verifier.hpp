@@ -14,6 +14,7 @@
 #include "run_check.hpp"
 #include "section_paths.hpp"
 #include "section_rules.hpp"
+#include "tools_in_use.hpp"
 #include "track.hpp"
 #include "unflex/core/error.hpp"
 #include "unflex/core/progress.hpp"
@@ -61,6 +62,7 @@ class Verifier {
   bool next_resting_move(planner::PlannedMove& move);
   bool next_output_move(OutputMove& move);
   bool ends_here(const planner::PlannedMove& move, const Track& file);
+  void follow_tool();
   template <class Hung>
   void change_machine(const planner::PlannedMove& move, Hung& nozzles) const;
   void begin_section(bool compensated);
@@ -100,7 +102,8 @@ class Verifier {
   void compare_lines(bool complete);
   [[nodiscard]] VerifyReport report();
 
-  Rules rules_;
+  Rules rules_;  // nozzle and change are those of the tool in use
+  ToolsInUse tools_;
   ReadingProgress progress_;
   Observer* observer_;
   Violations violations_;

@@ -146,4 +146,15 @@ void Verifier::check_regime(const Section& input, const Section& output) {
   }
 }
 
+// A firmware takes another tool while the machine stands still, and needs some time for it. So the
+// nozzles of the other tool are at rest.
+void Verifier::follow_tool() {
+  if (!tools_.take(input_.section().tool, rules_)) {
+    return;
+  }
+  for_sliced([&](Nozzles& nozzles) { nozzles.set_models(tools_.nozzles()); });
+  emitted_.set_models(tools_.nozzles());
+  kept_.set_models({coarse(rules_.nozzle)});
+}
+
 }  // namespace unflex::verify

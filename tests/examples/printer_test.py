@@ -27,6 +27,7 @@ OTHERS = re.compile(r"# (joint_[abc]|map|offset_mm|range_[abc]_mm|bars_mm|rail_[
                     r"elbow_deg|tool_mass_g) = ")
 # The sections of drives, which stand in for the axes'.
 DRIVES = re.compile(r"# \[dynamics\.[abc]\]")
+TOOL = re.compile(r"# (\[tool\.\d+\]|dynamics\.\S+ = |offset_mm = \[17)")
 MODAL = re.compile(r"(# )?(freq_hz|damping_ratio) = ")
 
 
@@ -93,12 +94,29 @@ class PrinterFile(unittest.TestCase):
             self.assertIn("110", str(shown[f"dynamics.{axis}.mode"]))
             self.assertEqual(shown[f"dynamics.{axis}.freq_hz"], 45)
 
+    def test_tools_may_have_their_own(self):
+        first = next(number for number, line in enumerate(self.lines) if line == "# [tool.0]")
+        tools = [re.sub(r"^# ", "", line) if TOOL.match(line) else line
+                 for line in self.lines[first:]]
+        shown = self.settings(self.lines[:first] + tools)
+        own = {key: value for key, value in shown.items() if key.startswith("tool.")}
+        self.assertEqual(own, {"tool.1.dynamics.x.freq_hz": 36,
+                               "tool.1.dynamics.x.damping_ratio": 0.08,
+                               "tool.1.dynamics.y.freq_hz": 34,
+                               "tool.1.dynamics.y.damping_ratio": 0.08,
+                               "tool.1.offset_mm": [17.5, -2]})
+        page = text_of(DOCS, "configuration.md")
+        for key in own:
+            self.assertIn("`" + key.removeprefix("tool.1.") + "`", page)
+
     def test_every_key_that_klipper_needs_is_there(self):
         there = set()
         section = ""
         for line in self.lines:
-            if found := re.match(r"(?:# )?\[([a-z.]+)\]", line):
+            if found := re.match(r"(?:# )?\[([a-z0-9.]+)\]", line):
                 section = found.group(1)
+            elif section.startswith("tool."):
+                continue  # the page has a list of these
             elif found := re.match(KEY, line):
                 there.add(f"{section}.{found.group(2)}")
         rows = re.findall(r"^\| `([\w.]+)` \|.*\| (.*) \|$", text_of(DOCS, "configuration.md"),

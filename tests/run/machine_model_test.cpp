@@ -97,6 +97,34 @@ TEST(AMachineThatChanges, KeepsWithinATwentiethOfAPercent) {
   }
 }
 
+// A tool's own frequency, then the share that the bed's mass makes of it: 36 Hz · √(500 / 750).
+TEST(AToolChanger, HasTheRulesOfTheToolInUse) {
+  machine::Settings settings = flow::testing::settings();
+  settings.dynamics.y.freq_hz = 38.0;
+  settings.dynamics.y.moving_mass_g = 500.0;
+  settings.tools = {{.number = 0}, {.number = 1, .freq_hz = {30.0, 36.0}}};
+  int made = 0;
+  MachineModel machine(settings, [&](const machine::Settings& of) {
+    ++made;
+    return rules_for(of);
+  });
+  const auto rules = machine.at({.printed_g = 250.0, .tool = 1});
+  EXPECT_NEAR(y_hz(*rules), 29.3939, 0.0005 * 30.0);
+  EXPECT_EQ(rules->settings.dynamics.x.freq_hz, 30.0);
+  EXPECT_NEAR(rules->verify.nozzle.y.slowest_rad_s(), 2.0 * std::numbers::pi * 29.3939,
+              0.0005 * 2.0 * std::numbers::pi * 30.0);
+  EXPECT_NEAR(y_hz(*machine.at({.printed_g = 250.0, .tool = 0})), 31.0269, 0.0005 * 31.0);
+  // The verdict knows all tools.
+  ASSERT_EQ(machine.as_given().verify.tools.size(), 2U);
+  EXPECT_NEAR(machine.as_given().verify.tools[1].nozzle.y.slowest_rad_s(),
+              2.0 * std::numbers::pi * 36.0, 1e-9);
+  const int made_before = made;
+  for (int i = 0; i < 60; ++i) {
+    static_cast<void>(machine.at({.printed_g = 250.0, .tool = i % 2}));
+  }
+  EXPECT_EQ(made, made_before);
+}
+
 TEST(AMachineThatStays, HasOneSetOfRules) {
   MachineModel machine(flow::testing::settings(), rules_for);
   EXPECT_EQ(machine.at({}), machine.at({1e6, 1e3}));

@@ -46,6 +46,7 @@ struct MachineState {
   double printed_g = 0.0;      // lies on the bed
   double height_mm = 0.0;      // of the nozzle
   Axes<double> place_mm = {};  // of the nozzle over the bed
+  int tool = 0;                // in use
 };
 
 // A printer file gives either freq_hz and damping_ratio, or mass_g, stiffness_n_mm and
@@ -95,6 +96,20 @@ struct SwingSettings {
   std::array<DriveSettings, 3> drives;  // of the motors, in the order of Motors
 
   [[nodiscard]] bool has_masses() const { return of == kOfMasses; }
+};
+
+// The tools of a tool changer are numbered from 0 on.
+inline constexpr int kMostTools = 16;
+
+// What is special about one tool of a tool changer. What is not set is as with the printer itself.
+struct ToolSettings {
+  int number = 0;
+  // A tool with either of them swings in one mode.
+  Axes<std::optional<double>> freq_hz = {};
+  Axes<std::optional<double>> damping_ratio = {};
+  // Where its nozzle is, seen from that of a tool without offset. The firmware makes up for it, so
+  // a print tells places of the nozzle, and the carriage is at the place less the offset.
+  Axes<double> offset_mm = {};
 };
 
 // The shares by which the axes' frequencies and damping ratios may be off, either way.

@@ -312,6 +312,7 @@ struct Settings {
   HotendSettings hotend;
   Axes<AxisDynamics> dynamics;
   SwingSettings swing;
+  std::vector<ToolSettings> tools;  // by rising numbers; empty: all tools are alike
   DynamicsError dynamics_error;
   SecondSettings second;
   KinematicsSettings kinematics;
@@ -321,7 +322,8 @@ struct Settings {
   EmitSettings emit;
   VerifySettings verify;
   // Where each key in force came from ("limits.max_accel_mm_s2" → "printer.toml:7", "--set",
-  // "default"), one entry for every known key, in the order of the documentation.
+  // "default"), one entry for every known key, in the order of the documentation, then one for each
+  // key that a tool gives.
   std::vector<std::pair<std::string, std::string>> origins;
   // Remarks for the user about the settings that were read.
   std::vector<Diagnostic> notes;

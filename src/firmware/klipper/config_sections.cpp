@@ -208,8 +208,8 @@ class Reader {
     return value;
   }
 
-  void note(SourcePlace at, std::string message) {
-    reading_.note(std::move(at), std::move(message));
+  void note(SourcePlace at, std::string message, std::vector<std::string> keys = {}) {
+    reading_.note(std::move(at), std::move(message), std::move(keys));
   }
 
   Status kinematics() {
@@ -315,16 +315,16 @@ class Reader {
           name == "dual_carriage" || name.starts_with("dual_carriage ") || name == "toolchanger";
       const KlipperOption* const text =
           name.starts_with("gcode_macro ") ? section.find("gcode") : nullptr;
-      if (changes_heads) {
-        note(section.place, fmt::format("[{}]: this printer has more than one head, and unflex "
-                                        "takes one resonance for all; measure the head that "
-                                        "prints, and keep a printer file for each",
-                                        name));
-      } else if (text != nullptr && sets_shaper(text->text)) {
-        note(section.place, fmt::format("[{}] sets an input shaper of its own, so there is more "
-                                        "than one resonance; unflex takes one, so keep a printer "
-                                        "file for each",
-                                        name));
+      const std::string_view sign = changes_heads ? ": this printer has more than one head"
+                                    : text != nullptr && sets_shaper(text->text)
+                                        ? " sets an input shaper of its own"
+                                        : "";
+      if (!sign.empty()) {
+        note(section.place,
+             fmt::format("[{}]{}, and unflex takes one resonance for all; measure each head, and "
+                         "give each its own by tool.1.dynamics.x.freq_hz and so on",
+                         name, sign),
+             {std::string(kToolSection)});
       }
     }
   }

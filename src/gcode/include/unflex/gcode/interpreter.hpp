@@ -162,6 +162,8 @@ struct Event {
   bool waits_for_buffer = false;
   std::vector<std::string> warnings;  // remarks for the user about this line
   bool added = false;                 // not a line of the file, but an Interpreter::approach
+  // The tool that the line selects (gcode::selected_tool()), 0 or more.
+  std::optional<int> tool = std::nullopt;
 
   // Undoes the interpretation; keeps the line and the storage.
   void reset();
@@ -220,6 +222,8 @@ struct InterpreterOptions {
   // max_extrude_dab_mm. Klipper ends the print at such a move (kinematics/extruder.py, check_move).
   double max_extrude_ratio = std::numeric_limits<double>::infinity();
   double max_extrude_dab_mm = 0.0;
+  // The tools that the printer file tells of. Empty: it tells of none, and any may be selected.
+  std::vector<int> tools{};
   // How long the nozzle swings after a move. 0: it is not waited for.
   double settling_s = 0.0;
   // Steps per mm of the configuration; an M92 must agree with them.

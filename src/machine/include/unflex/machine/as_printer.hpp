@@ -24,6 +24,10 @@ inline constexpr double kGrid_mm = 1e-4;
 // The grid on which lines end, mm: that one, or steps.
 [[nodiscard]] double grid_mm(const Settings& settings);
 
+// The settings of a machine that has this tool and no other. A tool that the settings do not tell
+// of is as the printer itself.
+[[nodiscard]] Settings with_tool(Settings settings, int number);
+
 // What mass, height and place make of an axis' frequencies, as factors.
 struct FrequencyShare {
   double by_print = 1.0;  // mass and height

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -34,6 +35,7 @@ class Admission {
 
   MachineModel* machine_;
   std::shared_ptr<const RunRules> rules_;  // of the run at hand
+  std::optional<int> tool_;                // of the last piece between runs; unset: none has come
   std::string input_name_;
   const std::vector<verify::BlamedRun>* kept_;
   report::Report* report_;

@@ -36,6 +36,7 @@ struct Piece {
   // Pressure advance that the file has set when a run begins, or when what is between two runs
   // ends; nullopt: not set.
   gcode::PressureAdvance pressure_advance;
+  int tool = 0;               // in use; 0 also where the printer file tells of no tools
   gcode::Position from_mm{};  // where the piece's first move finds the machine
   // Some moves of the run around this part: none before the first part and after the last.
   std::vector<planner::PlannedMove> before;
@@ -63,7 +64,8 @@ class PieceReader {
 
   // The next piece; false at the end of the input. An error of kind input when the text cannot be
   // read, was written by unflex, has E in another mode than it says, ends without a single G-code
-  // command in it, or has a move without end. The former content of the piece is lost, and the
+  // command in it, selects a tool that the interpreter's options do not name, or has a move without
+  // end. The former content of the piece is lost, and the
   // storage of its lines is used again.
   [[nodiscard]] Result<bool> next(Piece& piece);
 
@@ -116,6 +118,7 @@ class PieceReader {
   std::size_t unlisted_warnings_ = 0;
   gcode::FeatureKind feature_ = gcode::FeatureKind::other;  // that the slicer named last
   bool any_command_ = false;
+  int tool_ = 0;
   gcode::ExtrusionModeCheck extrusion_mode_;
 };
 

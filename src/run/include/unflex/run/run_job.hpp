@@ -98,8 +98,9 @@ struct RunRules {
 struct RunJob {
   Piece piece;
   std::atomic<Stage> stage = Stage::read;
-  // The members from here on are only used for runs and parts of runs.
+  // Of what is between two runs only where another tool is taken.
   std::shared_ptr<const RunRules> rules;
+  // The members from here on are only used for runs and parts of runs.
   std::string failure;             // why the run is kept
   dynamics::NozzleXY nozzle;       // at its begin, if every run before is compensated
   dynamics::NozzleXY first_stage;  // `nozzle` as a state of the setup's axes

@@ -97,6 +97,8 @@ struct Observation {
   // recorder needs, then any others.
   std::vector<NozzleModel> detuned;
   Observer* observer = nullptr;
+  // What `detuned` is while each of Rules::tools is in use: as many for each.
+  std::vector<std::vector<NozzleModel>> detuned_by_tool = {};
 };
 
 }  // namespace unflex::verify

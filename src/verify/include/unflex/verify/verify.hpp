@@ -47,6 +47,14 @@ struct Leeway {
 // Where the timing is free, the nozzle may at its worst stray this many times the tolerance.
 inline constexpr double kTimesTolerance = 1.1;
 
+// What is special about one tool of a tool changer.
+struct ToolModel {
+  int number = 0;
+  NozzleModel nozzle;
+  std::vector<NozzleModel> plants;  // as many as Rules::plants
+  MachineChange change;
+};
+
 struct Rules {
   gcode::InterpreterOptions interpreter;
   planner::Limits limits;
@@ -54,6 +62,9 @@ struct Rules {
   NozzleModel nozzle;
   std::vector<NozzleModel> plants;  // what else the axes may be
   MachineChange change;
+  // Each tool with a model of its own. Another tool, and the machine before the first line that
+  // selects one, if 0 is not among these, have the models above.
+  std::vector<ToolModel> tools;
   TravelLimits travel;
   double base_max_velocity_mm_s = 600.0;
   // Limits of the acceleration of a run's motors: a fixed one, and one as a multiple of the plan's
