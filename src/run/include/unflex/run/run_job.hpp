@@ -98,7 +98,7 @@ struct RunRules {
 struct RunJob {
   Piece piece;
   std::atomic<Stage> stage = Stage::read;
-  // Of what is between two runs only where another tool is taken.
+  // What is between two runs has them only where another tool is taken.
   std::shared_ptr<const RunRules> rules;
   // The members from here on are only used for runs and parts of runs.
   std::string failure;             // why the run is kept
