@@ -70,7 +70,10 @@ report::Report new_report(std::string command, const Job& job) {
 std::unique_ptr<record::Recorder> recorder_for(const Job& job, const verify::Rules& rules) {
   static constexpr std::array kOfSummary = {dynamics::ShaperKind::zv};
   record::Options options;
-  options.nozzle = rules.nozzle;
+  // The shapers are for the tool with which a print begins.
+  options.nozzle = !rules.tools.empty() && rules.tools.front().number == 0
+                       ? rules.tools.front().nozzle
+                       : rules.nozzle;
   std::optional<record::PrinterShaper> own = printer_shaper(rules);
   if (job.all_shapers) {
     if (own) {

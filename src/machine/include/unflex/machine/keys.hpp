@@ -15,7 +15,8 @@ struct KeyDescription {
   std::string meaning;        // one line
 };
 
-// Every key a printer file may hold except schema_version, in the order of the documentation.
+// Every key a printer file may hold except schema_version and those of tools, in the order of the
+// documentation.
 [[nodiscard]] std::vector<KeyDescription> describe_keys();
 
 }  // namespace unflex::machine

@@ -22,7 +22,7 @@ struct PrinterShaper {
 };
 
 struct Options {
-  verify::NozzleModel nozzle;                     // Rules::nozzle of the verification
+  verify::NozzleModel nozzle;  // what the shapers are for: Rules::nozzle or a tool's
   std::optional<PrinterShaper> printer_shaper{};  // nullopt if it has none or none is known
   // Further shapers that the print is measured with.
   std::span<const dynamics::ShaperKind> shapers = dynamics::kShaperKinds;
