@@ -96,11 +96,17 @@ Json plants_json(const std::vector<PlantDeviation>& plants) {
 }
 
 Json rows_json(const verify::Deviation& rows) {
-  Json json = {{"extruding", row_json(rows.extruding)}, {"all", row_json(rows.all)}};
-  if (rows.height) {
-    json["height"] = {{"max_mm", rows.height->max_mm}, {"rms_mm", rows.height->rms_mm}};
-  }
-  return json;
+  return {{"extruding", row_json(rows.extruding)}, {"all", row_json(rows.all)}};
+}
+
+Json height_json(const verify::Measured& measured) {
+  const auto& before = measured.uncompensated.height;
+  const auto& after = measured.compensated.height;
+  const auto row = [](const verify::HeightStats& stats) {
+    return Json{{"max_mm", stats.max_mm}, {"rms_mm", stats.rms_mm}};
+  };
+  return before && after ? Json{{"uncompensated", row(*before)}, {"compensated", row(*after)}}
+                         : Json();
 }
 
 Json fallbacks_json(const std::vector<Fallback>& fallbacks) {
@@ -205,6 +211,7 @@ void add_motion(const Report& r, Json& json) {
                        {"compensated", rows_json(r.measured.compensated)}};
   json["corners"] = {{"uncompensated", corners_json(r.measured.uncompensated.corners)},
                      {"compensated", corners_json(r.measured.compensated.corners)}};
+  json["height"] = height_json(r.measured);
   json["laid_line"] = laid_line_json(r.measured);
   json["plants"] = plants_json(r.others.plants);
   json["robustness"] = nullptr;

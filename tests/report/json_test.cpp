@@ -220,6 +220,15 @@ TEST(JsonReport, HasEmptyListsRatherThanNone) {
   EXPECT_EQ(json["printer"], nlohmann::json::object());
 }
 
+TEST(JsonReport, HasTheHeightOfMachinesThatMoveTheNozzleInZ) {
+  Report report = sample_report();
+  EXPECT_TRUE(parsed(report)["height"].is_null());
+  report.measured.uncompensated.height = verify::HeightStats{0.02, 0.005};
+  report.measured.compensated.height = verify::HeightStats{0.003, 0.0006};
+  EXPECT_EQ(parsed(report)["height"]["compensated"]["rms_mm"], 0.0006);
+  EXPECT_THAT(to_text(report), ::testing::HasSubstr("  height          20.0 → 3.00"));
+}
+
 TEST(JsonReport, SurvivesNamesThatAreNotUtf8) {
   Report report = sample_report();
   report.input = "caf\xe9.gcode";
@@ -246,8 +255,11 @@ TEST(JsonReport, IsIndentedAndEndsWithANewline) {
 }
 
 TEST(ReportPage, DocumentsExactlyTheKeysOfAReport) {
+  Report report = sample_report();
+  report.measured.uncompensated.height = verify::HeightStats{0.02, 0.005};
+  report.measured.compensated.height = verify::HeightStats{0.003, 0.0006};
   std::set<std::string> keys;
-  collect_keys(parsed(sample_report()), "", keys);
+  collect_keys(parsed(report), "", keys);
   EXPECT_EQ(documented_keys(std::string(test_paths::kDocs) + "/report.md", "compensate and verify"),
             keys);
 }
