@@ -99,6 +99,28 @@ Json rows_json(const verify::Deviation& rows) {
   return {{"extruding", row_json(rows.extruding)}, {"all", row_json(rows.all)}};
 }
 
+Json places_json(const verify::Measured& measured) {
+  const auto of = [](const verify::PlaceErrors& places) {
+    Json json = {{"squares", Json::array()}, {"bands", Json::array()}};
+    for (const verify::PlaceErrors::Square& square : places.squares) {
+      json["squares"].push_back({{"x_mm", square.x_mm},
+                                 {"y_mm", square.y_mm},
+                                 {"contour_rms_mm", square.error.rms_mm},
+                                 {"duration_s", square.error.duration_s}});
+    }
+    for (const verify::PlaceErrors::Band& band : places.bands) {
+      json["bands"].push_back({{"from_mm", band.from_mm},
+                               {"contour_rms_mm", band.error.rms_mm},
+                               {"duration_s", band.error.duration_s}});
+    }
+    return json;
+  };
+  const auto& before = measured.uncompensated.places;
+  const auto& after = measured.compensated.places;
+  return before && after ? Json{{"uncompensated", of(*before)}, {"compensated", of(*after)}}
+                         : Json();
+}
+
 Json height_json(const verify::Measured& measured) {
   const auto& before = measured.uncompensated.height;
   const auto& after = measured.compensated.height;
@@ -212,6 +234,7 @@ void add_motion(const Report& r, Json& json) {
   json["corners"] = {{"uncompensated", corners_json(r.measured.uncompensated.corners)},
                      {"compensated", corners_json(r.measured.compensated.corners)}};
   json["height"] = height_json(r.measured);
+  json["places"] = places_json(r.measured);
   json["laid_line"] = laid_line_json(r.measured);
   json["plants"] = plants_json(r.others.plants);
   json["robustness"] = nullptr;

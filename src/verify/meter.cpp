@@ -62,6 +62,9 @@ void Meter::set_models(const std::vector<NozzleModel>& models) {
 
 void Meter::set_machine(const MachineChange& change, const gcode::Position& at) {
   over_bed_ = change.acts_over_bed() ? &change : nullptr;
+  if (!places_) {
+    places_.emplace();
+  }
   machine_at_mm_ = at;
   bundle_.set_frequencies(change.frequency_shares(at));
 }
@@ -352,6 +355,9 @@ void Meter::count(const Sample& from, const Sample& to, const ReferencePhase& re
   if (laying) {
     add(extruding_);
     section_error_.add(bundle_.mean_mm2(), bundle_.largest_mm2(), h, to.line);
+    if (places_) {
+      places_->add(dynamics::place_mm(nozzle), machine_at_mm_[gcode::Z], bundle_.mean_mm2(), h);
+    }
   }
   if (!measured) {
     return;

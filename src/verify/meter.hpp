@@ -12,6 +12,7 @@
 #include "lag_estimate.hpp"
 #include "laid_line.hpp"
 #include "path_corners.hpp"
+#include "place_gauge.hpp"
 #include "reference_phase.hpp"
 #include "shaped_base.hpp"
 #include "unflex/verify/deviation.hpp"
@@ -169,6 +170,10 @@ class Meter {
   [[nodiscard]] std::optional<HeightStats> height() const {
     return bundle_.moves_in_z() ? std::optional(height_.stats()) : std::nullopt;
   }
+  // nullopt while set_machine() was not called.
+  [[nodiscard]] std::optional<PlaceErrors> places() const {
+    return places_ ? std::optional(places_->errors()) : std::nullopt;
+  }
   [[nodiscard]] NozzleXY nozzle() const { return bundle_.nozzle(); }
   [[nodiscard]] const XY& base_mm() const { return base_mm_; }
   [[nodiscard]] const DeviationAccumulator& extruding() const { return extruding_; }
@@ -216,6 +221,7 @@ class Meter {
   bool last_measured_ = false;
   XY base_mm_;
   HeightGauge height_;
+  std::optional<PlaceGauge> places_;
   const MachineChange* over_bed_ = nullptr;  // set while frequencies change over the bed
   gcode::Position machine_at_mm_{};          // where they are those of bundle_
   std::size_t current_ = 0;                  // piece of the reference at time_s_

@@ -12,7 +12,7 @@ Deviation deviation(const Meter& meter) {
 PlayedFile played(Meter& meter, const Track& track) {
   meter.line()->finish();
   return {deviation(meter),     meter.corners(),    meter.line()->stats(), meter.filament_lag(),
-          track.flow().stats(), track.printing_s(), track.pushed_mm()};
+          track.flow().stats(), track.printing_s(), track.pushed_mm(),     meter.places()};
 }
 
 }  // namespace

@@ -229,6 +229,27 @@ TEST(JsonReport, HasTheHeightOfMachinesThatMoveTheNozzleInZ) {
   EXPECT_THAT(to_text(report), ::testing::HasSubstr("  height          20.0 → 3.00"));
 }
 
+TEST(JsonReport, HasErrorsByPlaceOfMachinesThatChange) {
+  Report report = sample_report();
+  EXPECT_TRUE(parsed(report)["places"].is_null());
+  const verify::PlaceErrors before{
+      {{10.0, 10.0, {0.01, 2.0}}, {30.0, 10.0, {0.02, 2.0}}, {50.0, 10.0, {0.03, 2.0}}},
+      {{0.0, {0.02, 4.0}}, {1.0, {0.04, 2.0}}}};
+  const verify::PlaceErrors after{
+      {{10.0, 10.0, {1e-4, 2.0}}, {30.0, 10.0, {2e-4, 2.0}}, {50.0, 10.0, {9e-4, 0.1}}},
+      {{0.0, {3e-4, 4.0}}, {1.0, {4e-4, 2.0}}}};
+  report.measured.uncompensated.places = before;
+  report.measured.compensated.places = after;
+  const nlohmann::json places = parsed(report)["places"];
+  EXPECT_EQ(places["compensated"]["squares"][1]["contour_rms_mm"], 2e-4);
+  EXPECT_EQ(places["uncompensated"]["bands"][1]["from_mm"], 1.0);
+  // A square that is hardly printed on does not stand for others.
+  const std::string text = to_text(report);
+  EXPECT_THAT(text, ::testing::ContainsRegex("middle of the bed, around X30 Y10 +20.0 → 0.20"));
+  EXPECT_THAT(text, ::testing::ContainsRegex("where it is worst, around X30 Y10 +20.0 → 0.20"));
+  EXPECT_THAT(text, ::testing::ContainsRegex("the last one +40.0 → 0.40"));
+}
+
 TEST(JsonReport, SurvivesNamesThatAreNotUtf8) {
   Report report = sample_report();
   report.input = "caf\xe9.gcode";
@@ -258,6 +279,8 @@ TEST(ReportPage, DocumentsExactlyTheKeysOfAReport) {
   Report report = sample_report();
   report.measured.uncompensated.height = verify::HeightStats{0.02, 0.005};
   report.measured.compensated.height = verify::HeightStats{0.003, 0.0006};
+  const verify::PlaceErrors places{{{10.0, 30.0, {0.01, 2.0}}}, {{3.0, {0.02, 2.0}}}};
+  report.measured.uncompensated.places = report.measured.compensated.places = places;
   std::set<std::string> keys;
   collect_keys(parsed(report), "", keys);
   EXPECT_EQ(documented_keys(std::string(test_paths::kDocs) + "/report.md", "compensate and verify"),

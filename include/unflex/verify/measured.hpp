@@ -6,6 +6,7 @@
 #include <array>
 #include <cstddef>
 #include <optional>
+#include <vector>
 
 namespace unflex::verify {
 
@@ -133,6 +134,30 @@ struct FeedStats {
   std::size_t max_line = 0;
 };
 
+// The contour error of extruding moves in a part of the print.
+struct PartError {
+  double rms_mm = 0.0;
+  double duration_s = 0.0;
+};
+
+// Errors by places. Parts where nothing is laid are left out.
+inline constexpr double kSquare_mm = 20.0;
+inline constexpr double kBand_mm = 1.0;
+
+struct PlaceErrors {
+  struct Square {
+    double x_mm = 0.0;  // its middle
+    double y_mm = 0.0;
+    PartError error;
+  };
+  struct Band {
+    double from_mm = 0.0;  // its lower end
+    PartError error;
+  };
+  std::vector<Square> squares;  // of the bed, kSquare_mm wide, by rising Y and then X
+  std::vector<Band> bands;      // of the height, kBand_mm high, from below
+};
+
 // One of the two files as it is played.
 struct PlayedFile : Deviation {
   CornerStats corners;
@@ -141,6 +166,8 @@ struct PlayedFile : Deviation {
   FlowStats flow;
   double time_s = 0.0;        // dwells included
   double extrusion_mm = 0.0;  // net filament
+  // Set if the machine's frequencies change during the print.
+  std::optional<PlaceErrors> places = {};
 };
 
 // The replayed base in compensated runs, over the motors of X and Y.
