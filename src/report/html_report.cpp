@@ -10,6 +10,7 @@
 #include "answers.hpp"
 #include "assets.hpp"
 #include "facts.hpp"
+#include "places_card.hpp"
 #include "temperature_card.hpp"
 #include "unflex/core/base64.hpp"
 #include "unflex/report/format.hpp"
@@ -360,6 +361,7 @@ std::string to_html(const Report& report) {
   page.style = assets::report_css;
   page.body = hero(report);
   page.body += assets::report_html;
+  page.body += places_card(report.measured);
   page.body += report.temperature ? temperature_card(*report.temperature) : std::string{};
   page.body += embedded_json("data", data_json(report));
   page.body += fmt::format("<script type=\"application/octet-stream\" id=\"paths\">{}</script>\n",

@@ -247,5 +247,23 @@ TEST(HtmlReport, OfAnEmptyPrintHasNoInfinities) {
   EXPECT_THAT(page, Not(HasSubstr("inf ")));
 }
 
+TEST(HtmlReport, DrawsTheBedOfMachinesThatChange) {
+  Report report = recorded_report();
+  EXPECT_THAT(to_html(report), Not(HasSubstr("places-h")));
+  const verify::PlaceErrors before{{{10.0, 10.0, {0.02, 2.0}}, {30.0, 50.0, {0.01, 2.0}}},
+                                   {{0.0, {0.02, 4.0}}, {1.0, {0.04, 2.0}}}};
+  verify::PlaceErrors after = before;
+  after.squares[1].error.rms_mm = 4e-4;
+  report.measured.uncompensated.places = before;
+  report.measured.compensated.places = after;
+  const std::string html = to_html(report);
+  EXPECT_THAT(html, HasSubstr("<h2 id=\"places-h\">Over the bed and the height</h2>"));
+  EXPECT_THAT(html, HasSubstr("<title>X30 Y50: 0.40 µm RMS</title>"));
+  // Y points upwards: the square that is further back is higher.
+  EXPECT_THAT(html, HasSubstr("<rect x=\"20\" y=\"0\" width=\"19\""));
+  EXPECT_THAT(html, HasSubstr("<rect x=\"0\" y=\"40\" width=\"19\""));
+  EXPECT_THAT(html, HasSubstr("<td>1 to 2 mm</td><td>40.0</td><td>40.0</td>"));
+}
+
 }  // namespace
 }  // namespace unflex::report
