@@ -11,7 +11,7 @@ _unflex_options() {
     verify) echo "-h --help --against --strict $print --faster --max-deviation" ;;
     inspect) echo "-h --help --all --strict $print" ;;
     filament) echo '-h --help -o --output --in-place --strict --printer --set --filament-start-mm -q --quiet' ;;
-    study) echo "-h --help --case --machines --faster --at-all-times --accel --scale-m204 --keep-rms $print --engine -j --jobs" ;;
+    study) echo "-h --help --case --machines --map --faster --at-all-times --accel --scale-m204 --keep-rms $print --engine -j --jobs" ;;
     identify)
       echo '-h --help --axis --freq-start --freq-end --wave-spacing-mm --speed-mm-s --decay' \
            '--second --make-test -o --output --printer --set --report -q --quiet' ;;

@@ -88,6 +88,7 @@ complete -c unflex -n '__unflex_in compensate batch study' -l engine -x -a 'auto
 complete -c unflex -n '__unflex_in compensate batch' -l check-solver -d 'Have a sample solved by Ipopt as well'
 complete -c unflex -n '__unflex_in compensate batch study tune' -s j -l jobs -x -d 'How many to compute at once'
 complete -c unflex -n '__unflex_in study' -l machines -x -a '(__fish_complete_directories (commandline -ct))' -d 'Folder of resonance records of real machines'
+complete -c unflex -n '__unflex_in study' -l map -d 'The best shaper for the whole bed, and unflex at each place'
 complete -c unflex -n '__unflex_in study' -l faster -d 'The least print time within contour errors; =µm, as =10,20,50'
 complete -c unflex -n '__unflex_in study' -l at-all-times -d 'Let no moment exceed the tolerance'
 complete -c unflex -n '__unflex_in study' -l accel -x -d 'Compensate at these accelerations, as 2500,5000'

@@ -77,11 +77,18 @@ Status check_study(const RunConfig& config) {
   if (!has_print && !config.study.accels_mm_s2.empty()) {
     return usage("--accel needs a print to compensate");
   }
-  const int studies = (config.study.machines.empty() ? 0 : 1) +
+  if (!has_print && config.study.map) {
+    return usage("--map needs a print to measure at each place");
+  }
+  if (config.study.map && config.report && is_html(*config.report)) {
+    return usage(fmt::format("--report {}: study --map writes JSON; give a name that ends in .json",
+                             *config.report));
+  }
+  const int studies = (config.study.machines.empty() ? 0 : 1) + (config.study.map ? 1 : 0) +
                       (config.study.tolerances_um.empty() ? 0 : 1) +
                       (config.study.accels_mm_s2.empty() ? 0 : 1);
   if (studies > 1) {
-    return usage("give one of --machines, --faster and --accel");
+    return usage("give one of --machines, --map, --faster and --accel");
   }
   if (config.study.accels_mm_s2.empty() && (config.study.scale_m204 || config.study.keep_rms_um)) {
     return usage("--scale-m204 and --keep-rms go with --accel");

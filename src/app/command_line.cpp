@@ -239,6 +239,9 @@ void add_study(CLI::App& program, RunConfig& config) {
       ->add_option("--machines", config.study.machines,
                    "With IN: judge unflex and shapers on the machines whose records are in DIR")
       ->type_name("DIR");
+  command->add_flag(
+      "--map", config.study.map,
+      "With IN: the best shaper for the whole bed, and unflex at each place of the maps");
   command
       ->add_flag("--faster", config.faster_um,
                  "With IN: the least print time within contour errors, 5,10,20,50,100 by default")

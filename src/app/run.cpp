@@ -17,6 +17,7 @@
 #include "kinematics.hpp"
 #include "log.hpp"
 #include "machines.hpp"
+#include "map_study.hpp"
 #include "print_run.hpp"
 #include "printer_init.hpp"
 #include "printer_keys.hpp"
@@ -218,6 +219,9 @@ Result<ExitCode> run_command(const RunConfig& config, Console& console) {
       }
       if (!config.study.accels_mm_s2.empty()) {
         return run_accels(config, console);
+      }
+      if (config.study.map) {
+        return run_map_study(config, console);
       }
       return config.study.machines.empty() ? run_study(config, console)
                                            : run_machines(config, console);

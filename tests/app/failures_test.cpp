@@ -102,7 +102,7 @@ INSTANTIATE_TEST_SUITE_P(
         Failure{"ToleranceOnMachines",
                 {"study", "in.gcode", "--faster", "--machines", "m"},
                 1,
-                "unflex: give one of --machines, --faster and --accel"},
+                "unflex: give one of --machines, --map, --faster and --accel"},
         Failure{"AccelerationOfTheCorner",
                 {"study", "--accel", "5000"},
                 1,

@@ -106,6 +106,7 @@ struct Shard {
 struct StudyConfig {
   std::vector<std::string> cases;  // names; empty: all
   std::string machines;            // folder of records; empty: none
+  bool map = false;                // one shaper for the whole bed against one optimum per place
   // Tolerances that the print must keep, µm, and whether it must keep them at all times.
   std::vector<double> tolerances_um;
   bool at_all_times = false;
