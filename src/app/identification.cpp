@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "identification_parts.hpp"
+#include "identification_places.hpp"
 #include "sparkline.hpp"
 #include "unflex/app/run_config.hpp"
 #include "unflex/report/json_parts.hpp"
@@ -89,7 +90,15 @@ std::string plants_text(identify::Axis axis, const AxisModel& model) {
                             text.substr(1);
 }
 
-std::string modes_text(identify::Axis axis, const AxisModel& model) {
+// The places of an axis; none unless its records are of several.
+const identify::AxisOverPlaces* places_of(const Identification& identification,
+                                          identify::Axis axis) {
+  const auto found = identification.over_places.find(axis);
+  return found == identification.over_places.end() ? nullptr : &found->second;
+}
+
+// has_maps: the frequency is what shares are told of, so it is written as exactly as the maps.
+std::string modes_text(identify::Axis axis, const AxisModel& model, bool has_maps) {
   const auto line = [](std::string_view key, const std::string& value, const Estimate& e) {
     return fmt::format("{} = {}  # 95 %: {}\n", key, value, interval_text(e));
   };
@@ -99,7 +108,9 @@ std::string modes_text(identify::Axis axis, const AxisModel& model) {
     text += fmt::format("{}{}\n", text.empty() ? "" : "\n",
                         is_alone ? fmt::format("[dynamics.{}]", letter(axis))
                                  : fmt::format("[[dynamics.{}.mode]]", letter(axis)));
-    text += line("freq_hz", estimate_text(mode.freq_hz), mode.freq_hz) +
+    text += line("freq_hz",
+                 has_maps ? fmt::format("{:.2f}", mode.freq_hz.value) : estimate_text(mode.freq_hz),
+                 mode.freq_hz) +
             line("damping_ratio", estimate_text(mode.damping_ratio), mode.damping_ratio);
     if (!is_alone) {
       text += line("gain", fmt::format("{:.4f}", mode.gain.value), mode.gain);
@@ -119,10 +130,6 @@ std::string second_text(const Identification& identification) {
     }
   }
   return text.empty() ? text : "[second]\n" + text;
-}
-
-Json estimate_json(const Estimate& e) {
-  return {{"value", e.value}, {"low", e.low}, {"high", e.high}};
 }
 
 Json model_json(const AxisModel& model) {
@@ -152,6 +159,7 @@ Json record_json(const IdentifiedRecord& record) {
   Json json = model_json(fit.model);
   json["name"] = record.name;
   json["axis"] = std::string(1, letter(record.axis));
+  json["place_mm"] = record.place_mm ? Json(*record.place_mm) : Json(nullptr);
   json["refusal"] = fit.is_trusted() ? Json(nullptr) : Json(fit.refusal);
   json["direction"] = fit.direction;
   json["unexplained"] = fit.unexplained;
@@ -172,7 +180,10 @@ std::string snippet(const Identification& identification) {
   }
   std::string text;
   for (const auto& [axis, model] : identification.axes) {
-    text += (text.empty() ? "" : "\n") + modes_text(axis, model) + plants_text(axis, model);
+    const identify::AxisOverPlaces* const places = places_of(identification, axis);
+    const std::string maps = places != nullptr ? maps_text(axis, *places) : std::string{};
+    text += (text.empty() ? "" : "\n") + modes_text(axis, model, !maps.empty()) + maps +
+            plants_text(axis, model);
   }
   return text;
 }
@@ -188,6 +199,10 @@ std::vector<std::string> dynamics_overrides(const Identification& identification
           fmt::format("{}.damping_ratio={:.4f}", section, modes.front().damping_ratio));
     } else {
       overrides.push_back(fmt::format("{}.mode=[{}]", section, list_text(modes, ", ")));
+    }
+    if (const auto* const places = places_of(identification, axis);
+        places != nullptr && !places->maps.empty()) {
+      overrides.push_back(fmt::format("{}.map={}", section, maps_value(*places)));
     }
     std::string plants;
     for (const identify::Plant& plant : other_plants(model)) {
@@ -206,6 +221,9 @@ std::string identification_text(const Identification& identification) {
   for (const IdentifiedRecord& record : identification.records) {
     text += record_text(record) + "\n";
   }
+  for (const auto& [axis, places] : identification.over_places) {
+    text += places_text(axis, places) + "\n";
+  }
   return text + snippet(identification);
 }
 
@@ -216,7 +234,11 @@ std::string identification_json(const Identification& identification) {
   json["version"] = version();
   json["dynamics"] = Json::object();
   for (const auto& [axis, model] : identification.axes) {
-    json["dynamics"][std::string(1, letter(axis))] = model_json(model);
+    Json& of_axis = json["dynamics"][std::string(1, letter(axis))];
+    of_axis = model_json(model);
+    if (const auto* const places = places_of(identification, axis)) {
+      add_places(*places, of_axis);
+    }
   }
   json["records"] = Json::array();
   for (const IdentifiedRecord& record : identification.records) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "unflex/identify/axis_model.hpp"
+#include "unflex/identify/over_places.hpp"
 #include "unflex/rivals/klipper_calibration.hpp"
 
 namespace unflex::app {
@@ -15,6 +16,7 @@ struct IdentifiedRecord {
   std::string name;
   identify::Axis axis = identify::Axis::x;
   identify::RecordFit fit;
+  std::optional<identify::Place> place_mm = {};  // that its name tells
   // The shaper that Klipper's calibration would set up for the record. Unset: the record is not the
   // spectrum of an axis.
   std::optional<rivals::FittedShaper> shaper;
@@ -24,6 +26,8 @@ struct Identification {
   std::vector<IdentifiedRecord> records;  // in the order of the command line
   // From all trusted records of an axis. An axis without one is missing.
   std::map<identify::Axis, identify::AxisModel> axes;
+  // For an axis whose trusted records are of several places; its model is that in `axes`.
+  std::map<identify::Axis, identify::AxisOverPlaces> over_places;
   std::vector<std::string> warnings;  // "file: warning: …"
   bool is_second = false;             // the modes lie behind those that are already compensated for
   std::vector<std::string> refusals;  // "file: …", of axes without a trusted record

@@ -7,6 +7,7 @@
 #include "assets.hpp"
 #include "identification.hpp"
 #include "identification_parts.hpp"
+#include "identification_places.hpp"
 #include "unflex/app/run_config.hpp"
 #include "unflex/dynamics/shapers.hpp"
 #include "unflex/report/html_page.hpp"
@@ -144,11 +145,15 @@ std::string answer_card(const Identification& identification) {
       }
     }
   }
+  std::string places;
+  for (const auto& [axis, all] : identification.over_places) {
+    places += places_html(axis, all);
+  }
   return fmt::format(
-      "<section class=\"card\"><h2>{}: {}</h2>\n<div class=\"figures\">\n{}</div>\n{}"
+      "<section class=\"card\"><h2>{}: {}</h2>\n<div class=\"figures\">\n{}</div>\n{}{}"
       "<details><summary>Lines for the printer file</summary>\n<button type=\"button\" "
       "id=\"copy\">Copy</button>\n<pre id=\"lines\">{}</pre></details></section>\n",
-      identification.is_second ? "What still rings" : "The nozzle swings", found, pictures,
+      identification.is_second ? "What still rings" : "The nozzle swings", found, pictures, places,
       shapers.empty() ? std::string{}
                       : fmt::format("<p class=\"note\">Klipper would set up {}. At full height a "
                                     "shaper leaves all of a vibration.</p>\n",

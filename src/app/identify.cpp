@@ -78,7 +78,7 @@ Status add_set(const IdentifyConfig& config, const identify::DataSet& set, Ident
       shaper = found->recommended;
     }
   }
-  all.records.push_back({set.name, *axis, std::move(*fitted), shaper});
+  all.records.push_back({set.name, *axis, std::move(*fitted), set.place_mm, shaper});
   return {};
 }
 
@@ -109,12 +109,66 @@ Status add_tower(const IdentifyConfig& config, Identification& all) {
     warn(all, std::string(kName), warning);
   }
   all.records.push_back(
-      {std::string(kName), config.axis.value_or(identify::Axis::x), std::move(*fitted), {}});
+      {std::string(kName), config.axis.value_or(identify::Axis::x), std::move(*fitted), {}, {}});
+  return {};
+}
+
+void warn_of_disagreement(identify::Axis axis, Identification& all) {
+  warn(all, {},
+       fmt::format("the records along {} disagree by more than 5 %, as if they were of different "
+                   "machines; leave out those that are not of today's",
+                   letter(axis)));
+}
+
+// The trusted models of an axis with their places, if these are several. Otherwise nothing. A
+// record without a place among them could only blur the map.
+Result<std::vector<identify::PlacedModel>> placed_models(const Identification& all,
+                                                         identify::Axis axis) {
+  std::vector<identify::PlacedModel> models;
+  const IdentifiedRecord* without = nullptr;
+  for (const IdentifiedRecord& record : all.records) {
+    if (record.axis != axis || !record.fit.is_trusted()) {
+      continue;
+    }
+    if (record.place_mm) {
+      models.push_back({record.name, *record.place_mm, record.fit.model});
+    } else {
+      without = &record;
+    }
+  }
+  if (identify::count_places(models) < 2) {
+    return std::vector<identify::PlacedModel>{};
+  }
+  if (without != nullptr) {
+    return fail(ErrorKind::input, {without->name, 0},
+                fmt::format("its name tells no place, but that of {} does, and those along {} are "
+                            "of several places; name it like that one, or as "
+                            "raw_data_{}_at_100_50_20.csv, or leave it out",
+                            models.front().name, letter(axis), letter(axis)));
+  }
+  return models;
+}
+
+Status combine_placed(identify::Axis axis, const std::vector<identify::PlacedModel>& models,
+                      Identification& all) {
+  Result<identify::AxisOverPlaces> found = combine_over_places(models);
+  if (!found) {
+    return tl::unexpected(found.error());
+  }
+  for (const std::string& warning : found->warnings) {
+    warn(all, {}, fmt::format("along {}, {}", letter(axis), warning));
+  }
+  if (!found->agrees) {
+    warn_of_disagreement(axis, all);
+  }
+  all.axes[axis] = found->model;
+  all.over_places[axis] = std::move(*found);
   return {};
 }
 
 // Makes one model for each axis. A record without a model is left out if other records have one.
-void combine_records(Identification& all) {
+// A second mode has no maps.
+Status combine_records(Identification& all) {
   std::map<identify::Axis, std::vector<identify::AxisModel>> by_axis;
   for (const IdentifiedRecord& record : all.records) {
     if (record.fit.is_trusted()) {
@@ -122,14 +176,20 @@ void combine_records(Identification& all) {
     }
   }
   for (const auto& [axis, models] : by_axis) {
+    const Result<std::vector<identify::PlacedModel>> placed =
+        all.is_second ? std::vector<identify::PlacedModel>{} : placed_models(all, axis);
+    if (!placed) {
+      return tl::unexpected(placed.error());
+    }
+    if (!placed->empty()) {
+      if (Status combined = combine_placed(axis, *placed, all); !combined) {
+        return combined;
+      }
+      continue;
+    }
     all.axes[axis] = combine(models);
     if (!agree(models)) {
-      Diagnostic warning;
-      warning.message = fmt::format(
-          "the records along {} disagree by more than 5 %, as if they were of different machines; "
-          "leave out those that are not of today's",
-          letter(axis));
-      all.warnings.push_back(to_string(warning));
+      warn_of_disagreement(axis, all);
     }
   }
   for (const IdentifiedRecord& record : all.records) {
@@ -142,6 +202,7 @@ void combine_records(Identification& all) {
       all.refusals.push_back(fmt::format("{}: {}", record.name, record.fit.refusal));
     }
   }
+  return {};
 }
 
 }  // namespace
@@ -159,7 +220,9 @@ Result<Identification> identify_records(const IdentifyConfig& config) {
       return tl::unexpected(added.error());
     }
   }
-  combine_records(all);
+  if (Status combined = combine_records(all); !combined) {
+    return tl::unexpected(combined.error());
+  }
   return all;
 }
 

@@ -11,6 +11,7 @@ DataSet named_set(std::string name) {
   DataSet set;
   set.name = std::move(name);
   set.axis = axis_in_name(set.name);
+  set.place_mm = place_in_name(set.name);
   const bool is_along = set.name.find("axis=") != std::string::npos;
   const bool is_of_belt = set.name.find("belt_") != std::string::npos;
   set.is_diagonal = !set.axis && (is_along || is_of_belt);

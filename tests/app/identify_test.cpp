@@ -80,7 +80,12 @@ TEST_F(Identify, TakesTheAxisThatMovedMostAndSaysSo) {
 }
 
 TEST_F(Identify, WritesAReportWhoseKeysAreDocumented) {
-  ASSERT_EQ(run({"identify", "a_x.csv", "a_y.csv", "--report", "r.json"}).exit_code, 0);
+  write_file(path("b_y_at_0_100_20.csv"), ringing(50.0, 40.0));
+  write_file(path("b_y_at_100_100_20.csv"), ringing(50.0, 42.0));
+  ASSERT_EQ(run({"identify", "a_x.csv", "b_y_at_0_100_20.csv", "b_y_at_100_100_20.csv", "--report",
+                 "r.json"})
+                .exit_code,
+            0);
   const auto json = nlohmann::json::parse(read_file(path("r.json")));
   const nlohmann::json& freq_hz = json["dynamics"]["x"]["modes"][0]["freq_hz"];
   EXPECT_NEAR(freq_hz["value"].get<double>(), 50.0, 0.05);

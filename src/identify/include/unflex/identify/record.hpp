@@ -16,6 +16,9 @@ enum class Axis { x, y };
 
 [[nodiscard]] char letter(Axis axis);
 
+// X, Y and Z of the nozzle, in mm.
+using Place = std::array<double, 3>;
+
 // Samples of an accelerometer at even times.
 struct Recording {
   double rate_hz = 0.0;
@@ -36,8 +39,9 @@ struct Spectrum {
 struct DataSet {
   std::string name;  // name of the file; with several data sets in it, also of the column
   std::variant<Recording, Spectrum> data;
-  std::optional<Axis> axis;  // axis that the name tells
-  bool is_diagonal = false;  // a test of a belt, neither along X nor along Y
+  std::optional<Axis> axis;       // axis that the name tells
+  std::optional<Place> place_mm;  // place that the name tells
+  bool is_diagonal = false;       // a test of a belt, neither along X nor along Y
   std::vector<std::string> notes;
 };
 
@@ -57,5 +61,9 @@ struct DataSet {
 
 // The axis a file's name tells: "raw_data_x_1.csv", "resonances_axis=0.000,1.000,0.000.csv".
 [[nodiscard]] std::optional<Axis> axis_in_name(std::string_view file);
+
+// The place a file's name tells: "resonances_x_100.000_50.000_20.000_1.csv" by Klipper, and
+// "raw_data_x_at_100_50_20.csv" where the name is the user's.
+[[nodiscard]] std::optional<Place> place_in_name(std::string_view file);
 
 }  // namespace unflex::identify
