@@ -33,7 +33,7 @@ double over_bed(const Place& place_mm) {
 // Klipper's recording of a stop behind which this frequency rings.
 std::string ringing(double freq_hz, double noise = 0.0, std::uint32_t seed = 1) {
   constexpr double kRate_hz = 1600.0;
-  constexpr int kSamples = 400;
+  constexpr int kSamples = 300;
   std::mt19937 random(seed);
   std::normal_distribution<double> chance(0.0, 1.0);
   std::string text = "#time,accel_x,accel_y,accel_z\n";

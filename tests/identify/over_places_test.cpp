@@ -8,6 +8,7 @@
 #include <cmath>
 #include <random>
 
+#include "modes_simulation.hpp"
 #include "sweep_simulation.hpp"
 #include "welch.hpp"
 
@@ -168,6 +169,24 @@ TEST(OverPlaces, RefusesOnePlaceAndRecordsThatContradictEachOther) {
   ASSERT_FALSE(two);
   EXPECT_EQ(two.error().place.file, "odd.csv");
   EXPECT_THAT(two.error().message, HasSubstr("48.0 Hz at 0, 0, 0 mm, but record tells 45.0 Hz"));
+}
+
+TEST(OverPlaces, AnAxisOfSeveralModesHasNoMap) {
+  std::vector<PlacedModel> models;
+  for (const double share : {1.0, 0.9}) {
+    const SimulatedSpectrum of{.modes = {{45.0 * share, 0.06, 0.7}, {80.0 * share, 0.05, 0.3}},
+                               .windows = 60};
+    const Result<RecordFit> fit = fit_spectrum(simulate(of), {});
+    ASSERT_TRUE(fit && fit->is_trusted());
+    ASSERT_THAT(fit->model.modes, SizeIs(2));
+    models.push_back({"spectrum", {200.0 * share, 0.0, 0.0}, fit->model});
+  }
+  const AxisOverPlaces all = good(models);
+  EXPECT_THAT(all.maps, IsEmpty());
+  EXPECT_THAT(all.model.modes, SizeIs(2));
+  EXPECT_FALSE(all.agrees);
+  ASSERT_THAT(all.warnings, SizeIs(1));
+  EXPECT_THAT(all.warnings[0], HasSubstr("swings in several modes"));
 }
 
 TEST(OverPlaces, SweepsOfAMachineGiveItsMapBack) {
