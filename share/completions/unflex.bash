@@ -22,6 +22,7 @@ _unflex_options() {
       echo '-h --help --power --heater --ambient --ku --pu --rule --target --flow --heater-watts' \
            '--printer --set --report -q --quiet' ;;
     kinematics) echo '-h --help --fit --printer --set -q --quiet' ;;
+    translate) echo '-h --help -o --output --in-place --strict --printer --set -q --quiet' ;;
     printer) echo '-h --help' ;;
     'printer line-test') echo '-h --help -o --output --printer --set -q --quiet' ;;
     'printer macros') echo '-h --help -o --output --printer --set -q --quiet' ;;
@@ -32,7 +33,7 @@ _unflex_options() {
 
 _unflex_commands() {
   case $1 in
-    '') echo 'compensate batch verify inspect filament study identify tune hotend kinematics printer' ;;
+    '') echo 'compensate batch verify inspect filament study identify tune hotend kinematics translate printer' ;;
     printer) echo 'init line-test macros keys' ;;
   esac
 }
@@ -69,7 +70,7 @@ _unflex_value() {
       *:--bed-temp | *:--accel | *:--keep-rms | *:--power | *:--ambient | *:--ku | *:--pu | \
       *:--target | *:--flow | *:--heater-watts | *:--filament-start-mm) echo 'any' ;;
     *:--fit) echo 'files *.csv' ;;
-    compensate: | verify: | inspect: | filament: | study: | tune: | kinematics:) echo "files $print" ;;
+    compensate: | verify: | inspect: | filament: | study: | tune: | kinematics: | translate:) echo "files $print" ;;
     identify:) echo 'files *.csv' ;;
     hotend:) echo 'files *.@(csv|log|txt)' ;;
   esac

@@ -39,10 +39,10 @@ function __unflex_settings
     string match --all --regex -- '"[^"]+"|true|false' $of_key | string trim --chars '"' | string replace --regex -- '^' $typed[1]=
 end
 
-set -g __unflex_commands compensate batch verify inspect filament study identify tune hotend kinematics printer
+set -g __unflex_commands compensate batch verify inspect filament study identify tune hotend kinematics translate printer
 set -l gcode '(__unflex_files .gcode .gco .g .bgcode .gcode.gz)'
 set -l printer '(__unflex_files .toml .cfg .g .txt)'
-set -l prints compensate verify inspect filament study
+set -l prints compensate verify inspect filament study translate
 
 complete -c unflex -f
 complete -c unflex -s h -l help -d 'Print the options and exit'
@@ -58,6 +58,7 @@ complete -c unflex -n '__unflex_in ""' -a identify -d 'Find the resonances in re
 complete -c unflex -n '__unflex_in ""' -a tune -d 'Find the resonances by printing towers and looking at their walls'
 complete -c unflex -n '__unflex_in ""' -a hotend -d 'Find the gains that hold the temperature, from a log of a heating'
 complete -c unflex -n '__unflex_in ""' -a kinematics -d 'Show what a print asks of the joints, or find how they move'
+complete -c unflex -n '__unflex_in ""' -a translate -d 'Write a print as motion of the joints'
 complete -c unflex -n '__unflex_in ""' -a printer -d 'Printer files'
 complete -c unflex -n '__unflex_in printer' -a init -d 'Write a printer file from what already describes the printer'
 complete -c unflex -n '__unflex_in printer' -a line-test -d 'Write G-code that shows how many lines per second the printer takes'
@@ -69,8 +70,8 @@ complete -c unflex -n '__unflex_in identify' -a '(__unflex_files .csv)'
 complete -c unflex -n '__unflex_in tune kinematics' -a $gcode
 complete -c unflex -n '__unflex_in hotend' -a '(__unflex_files .csv .log .txt)'
 
-complete -c unflex -n '__unflex_in compensate filament' -s o -l output -x -a $gcode -d 'Where to write, - for stdout'
-complete -c unflex -n '__unflex_in compensate filament' -l in-place -d 'Replace the input'
+complete -c unflex -n '__unflex_in compensate filament translate' -s o -l output -x -a $gcode -d 'Where to write, - for stdout'
+complete -c unflex -n '__unflex_in compensate filament translate' -l in-place -d 'Replace the input'
 complete -c unflex -n '__unflex_in compensate' -l log -r -F -d 'Add what is said and the summary to a file'
 complete -c unflex -n '__unflex_in batch' -a '(__fish_complete_directories (commandline -ct))'
 complete -c unflex -n '__unflex_in batch' -s o -l output -x -a '(__fish_complete_directories (commandline -ct))' -d 'The folder to write to'
@@ -80,7 +81,7 @@ complete -c unflex -n '__unflex_in batch' -l shard -x -a auto -d 'Work on one of
 complete -c unflex -n '__unflex_in batch' -l watch -d 'Go on waiting for further prints'
 complete -c unflex -n '__unflex_in verify' -l against -x -a $gcode -d 'The sliced G-code it was made from'
 complete -c unflex -n '__unflex_in filament' -l filament-start-mm -x -d "Where on the filament's profile the print begins, mm"
-complete -c unflex -n '__unflex_in compensate verify inspect filament' -l strict -d 'Take warnings for errors'
+complete -c unflex -n '__unflex_in compensate verify inspect filament translate' -l strict -d 'Take warnings for errors'
 complete -c unflex -n '__unflex_in compensate batch verify' -l faster -d 'As fast as keeps the nozzle near the path; =µm'
 complete -c unflex -n '__unflex_in compensate batch' -l timing -x -a 'scaled optimal' -d 'How --faster finds the timing'
 complete -c unflex -n '__unflex_in compensate batch verify' -l max-deviation -x -d 'Exit with 3 if extruding moves stray further, mm'

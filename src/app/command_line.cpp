@@ -227,6 +227,17 @@ void add_filament(CLI::App& program, RunConfig& config) {
   });
 }
 
+void add_translate(CLI::App& program, RunConfig& config) {
+  CLI::App* const command = program.add_subcommand(
+      "translate",
+      "Write a print as motion of the joints, for a firmware that knows X, Y, Z alone");
+  add_print_and_output(*command, config);
+  add_settings(*command, config);
+  command->add_flag("-q,--quiet", config.quiet, "No summary and no progress");
+  add_strict(*command, config);
+  command->callback([&config] { config.command = Command::translate; });
+}
+
 void add_study(CLI::App& program, RunConfig& config) {
   CLI::App* const command = program.add_subcommand(
       "study", "Measure all ways to move the base against each other, on a corner or on a print");
@@ -458,6 +469,7 @@ Result<CommandLine> parse_command_line(const std::vector<std::string>& arguments
   add_tune(program, config);
   add_hotend(program, config);
   add_kinematics(program, config);
+  add_translate(program, config);
   add_study(program, config);
   program.footer(
       "Exit codes: 0 done, 1 usage or configuration, 2 bad input, 3 deviation above\n"

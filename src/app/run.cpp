@@ -24,6 +24,7 @@
 #include "printer_line_test.hpp"
 #include "printer_macros.hpp"
 #include "results.hpp"
+#include "translate.hpp"
 #include "tune.hpp"
 #include "unflex/core/caught.hpp"
 #include "unflex/core/lanes.hpp"
@@ -235,6 +236,8 @@ Result<ExitCode> run_command(const RunConfig& config, Console& console) {
       return run_hotend(config, console);
     case Command::kinematics:
       return run_kinematics(config, console);
+    case Command::translate:
+      return run_translate(config, console);
     case Command::compensate:
     case Command::verify:
       break;

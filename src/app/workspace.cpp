@@ -100,8 +100,11 @@ Result<machine::Settings> load_settings(const RunConfig& config, Input& input) {
     return tl::unexpected(print.error());
   }
   print->variables = config.slicer_settings;
-  Result<machine::Settings> settings = machine::load(
-      {.print = &*print, .printer_file = config.printer_file, .overrides = config.overrides});
+  Result<machine::Settings> settings =
+      machine::load({.print = &*print,
+                     .printer_file = config.printer_file,
+                     .overrides = config.overrides,
+                     .is_firmware_plain = config.command == Command::translate});
   if (settings && config.timing_method != TimingMethod::as_set && !settings->is_timing_free()) {
     return fail(ErrorKind::usage, "--timing says how --faster finds the timing; give that too");
   }

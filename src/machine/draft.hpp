@@ -49,6 +49,7 @@ struct Draft {
   // The end of a message about a missing setting, if the printer file names other files that could
   // not be read.
   std::string maybe_elsewhere;
+  bool is_firmware_plain = false;  // Sources::is_firmware_plain
 };
 
 }  // namespace unflex::machine

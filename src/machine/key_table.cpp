@@ -230,6 +230,8 @@ constexpr std::array kLaterKeys = {
     Key{"kinematics.offset_mm", &setting<&S::kinematics, &K::offset_mm>, kAny, "mm",
         "Where the joints of the three motors are when the tool is at 0, 0, 0",
         "as the legs of a tripteron tell, else [0, 0, 0]"},
+    Key{"kinematics.home_mm", &setting<&S::kinematics, &K::home_mm>, kAny, "mm",
+        "Where the tool is after G28, [x, y, z]; unflex translate begins there", kNotKnown},
     Key{"kinematics.range_a_mm", &of_axis<0, &S::kinematics, &K::range_mm>, kAny, "mm",
         "Where the joint of the first motor may be, [min, max]; unflex kinematics holds prints to "
         "it",

@@ -302,10 +302,27 @@ Status read_print(const Sources& sources, Draft& draft) {
   return applied;
 }
 
+// A firmware whose own configuration tells of other motors than those of X, Y and Z reckons with
+// them itself.
+Status check_plain(const std::string& text, const Draft& draft) {
+  const std::optional<SourcePlace>& place = draft.places[*find_key("kinematics.type")];
+  const Kinematics type = draft.settings.kinematics.type;
+  if (!draft.is_firmware_plain || source_kind(text) == SourceKind::toml || !place ||
+      type == Kinematics::cartesian) {
+    return {};
+  }
+  return fail(ErrorKind::usage, *place,
+              fmt::format("the firmware knows itself that the machine is {}, so print the sliced "
+                          "file as it is; unflex translate is for a firmware that does not",
+                          to_string(type)));
+}
+
 Status read_sources(const Sources& sources, Draft& draft) {
   if (sources.printer_file) {
     const Result<std::string> text = read_printer_file(*sources.printer_file);
-    const Status read = text ? read_printer(*text, *sources.printer_file, draft)
+    const Status read = text ? read_printer(*text, *sources.printer_file, draft).and_then([&] {
+      return check_plain(*text, draft);
+    })
                              : Status(tl::unexpected(text.error()));
     if (!read) {
       return read;
@@ -345,6 +362,7 @@ bool describes_printer(const PrintText& text) {
 
 Result<Settings> load(const Sources& sources) {
   Draft draft = defaults();
+  draft.is_firmware_plain = sources.is_firmware_plain;
   if (Status read = read_sources(sources, draft); !read) {
     return tl::unexpected(read.error());
   }

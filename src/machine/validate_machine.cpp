@@ -17,6 +17,9 @@ namespace {
 // Checks that the firmware can plan for the kinematics.
 Status check_kinematics(const Draft& draft) {
   const Settings& s = draft.settings;
+  if (draft.is_firmware_plain) {
+    return {};
+  }
   const auto refuse = [&](std::string_view why) {
     return conflict(draft, {"kinematics.type", "printer.firmware"},
                     fmt::format("kinematics.type is \"{}\", which {}; print the sliced file as it "

@@ -23,7 +23,7 @@ SEVERAL = re.compile(r"# (mode|plant) = ")
 NO_DEFAULT = re.compile(r"# (written|max_flow_mm3_s|max_speed_mm_s|outer_wall_tolerance_um|gain_c|advance_s|time_constant_s|"
                         r"dead_time_s|heater_w) = ")
 # For other machines than the example's.
-OTHERS = re.compile(r"# (joint_[abc]|map|offset_mm|range_[abc]_mm|bars_mm|rail_[yz]_mm|tool_joint_[abc]_mm|"
+OTHERS = re.compile(r"# (joint_[abc]|map|offset_mm|home_mm|range_[abc]_mm|bars_mm|rail_[yz]_mm|tool_joint_[abc]_mm|"
                     r"elbow_deg|tool_mass_g) = ")
 # The sections of drives, which stand in for the axes'.
 DRIVES = re.compile(r"# \[dynamics\.[abc]\]")

@@ -208,6 +208,8 @@ struct KinematicsSettings {
   std::array<std::optional<Motors::Row>, Motors::kCount> joints;
   // Where the motors' joints are when the tool is at 0, 0, 0. Unset: as the legs tell, or 0.
   std::optional<Motors::Row> offset_mm;
+  // Where the tool is after G28, for unflex translate. Unset: not known.
+  std::optional<Motors::Row> home_mm;
   // Where each motor's joint may be. Unset: not limited.
   std::array<std::optional<Range>, Motors::kCount> range_mm;
   // The legs of a tripteron, one number or place for each: docs/kinematics.md. All are set, or none
@@ -430,6 +432,9 @@ struct Sources {
   // If no source names a firmware, take the one that the print was sliced for. If this is false,
   // take the default: many printers are sliced for as if they had another firmware.
   bool firmware_as_sliced = false;
+  // The firmware moves each of X, Y and Z by a motor of its own, whatever kinematics.type says.
+  // Then that type must not be from the firmware's own configuration.
+  bool is_firmware_plain = false;
 };
 
 // Reads the settings: defaults, then what the print's slicer says of the printer, then the printer

@@ -30,12 +30,14 @@ enum class Command {
   tune,
   filament,
   hotend,
-  kinematics
+  kinematics,
+  translate
 };
 
 // Whether the command reads a print and writes another one.
 [[nodiscard]] constexpr bool writes_print(Command command) {
-  return command == Command::compensate || command == Command::filament;
+  return command == Command::compensate || command == Command::filament ||
+         command == Command::translate;
 }
 
 // The codes the program exits with, see docs/cli.md.

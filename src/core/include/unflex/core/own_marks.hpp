@@ -6,7 +6,8 @@
 
 namespace unflex {
 
-// Begins every comment line that unflex writes, but for kFilamentMark.
+// Begins every comment line that unflex writes, but for kFilamentMark and
+// kJointsMark.
 inline constexpr std::string_view kOwnMark = ";unflex";
 // Stands before the first line and behind the last line of each compensated run. If the base moves
 // before the plan does, kLeadInWord and a time in s follow the first. If the run need not last as
@@ -19,6 +20,10 @@ inline constexpr std::string_view kRunEndMark = ";unflex end";
 // Begins the last line of a print that was fitted to its filament. It does not begin with kOwnMark,
 // since such a print may still be compensated.
 inline constexpr std::string_view kFilamentMark = "; unflex filament:";
+
+// Begins the last line of a print whose X, Y and Z are joints. Such a print is not translated
+// again.
+inline constexpr std::string_view kJointsMark = "; unflex joints:";
 
 // The macro that a run calls where it begins and where it has ended.
 inline constexpr std::string_view kCheckpointMacro = "UNFLEX_CHECKPOINT";
