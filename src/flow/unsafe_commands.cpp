@@ -89,7 +89,7 @@ std::optional<std::string> why_unsafe(const gcode::Command& command) {
 }
 
 bool limits_joints(const gcode::Command& command) {
-  constexpr std::array kLimits = {201, 203, 205, 566};
+  constexpr std::array kLimits = {201, 203, 205, 208, 566};
   return is_of(command, 'M') && has(kLimits, command.number) && command.has_any("XYZ");
 }
 

@@ -15,7 +15,7 @@ namespace unflex::flow {
 // The command as messages call it: "G29", "BED_MESH_PROFILE".
 [[nodiscard]] std::string name_of(const gcode::Command& command);
 
-// Whether it sets limits of X, Y or Z, which are joints here: M201, M203, M205, M566.
+// Whether it sets limits of X, Y or Z, which are joints here: M201, M203, M205, M208, M566.
 [[nodiscard]] bool limits_joints(const gcode::Command& command);
 
 }  // namespace unflex::flow

@@ -201,7 +201,7 @@ void note_slow_z_motor(Draft& draft) {
   constexpr std::size_t kZ = 2;
   constexpr std::string_view kKey = "limits.max_z_accel_mm_s2";
   const double z_mm_s2 = s.axis_max_accel_mm_s2()[kZ];
-  if (!s.spec().motion.has_axis_limits || !s.motors().moves_xy(kZ) ||
+  if (draft.is_firmware_plain || !s.spec().motion.has_axis_limits || !s.motors().moves_xy(kZ) ||
       z_mm_s2 >= s.base_max_accel_mm_s2()) {
     return;
   }

@@ -1,7 +1,10 @@
 // What is refused, since a translation of it might break the machine.
 #include <gmock/gmock.h>
 
+#include <numbers>
+#include <sstream>
 #include <string>
+#include <variant>
 
 #include "translating.hpp"
 #include "translator.hpp"
@@ -127,6 +130,32 @@ TEST(TranslateRefuses, PlacesThatTheMachineCannotReach) {
   options.home_mm = kinematics::Point{-1.0, 0.0, 0.0};
   EXPECT_THAT(translated("G28\n", options),
               StartsWith("in.gcode:1: kinematics.home_mm is where G28 leaves the tool, but"));
+}
+
+TEST(TranslateRefuses, PlacesInTheMiddleOfAMove) {
+  TranslatorOptions options = translating(tripteron());
+  kinematics::Tripteron legs{.linear = std::get<kinematics::Linear>(options.machine.mechanism),
+                             .legs = {},
+                             .bars = {.upper_mm = 180.0, .lower_mm = 100.0}};
+  // In the middle, at Y55 Z40, the legs are 70.7 mm long, and folded they are 80.
+  legs.legs.fill({.rail_y_mm = 80.0, .rail_z_mm = 0.0, .tool_joint_mm = {-20.0, 25.0, 10.0}});
+  options.machine.mechanism = legs;
+  options.home_mm = kinematics::Point{0.0, -20.0, 40.0};
+  EXPECT_THAT(translated("G28\nG1 Y-10 F600\nG1 Y130\n", options),
+              StartsWith("in.gcode:3: the tool cannot be at X0 Y-6 Z40: leg B would have to be "));
+  EXPECT_EQ(lines_of(translated("G28\nG1 Z80 F600\nG1 Y130\nG1 Z40\n", options)), 4);
+}
+
+TEST(TranslateRefuses, PlacesBeyondTheRodsOfADelta) {
+  constexpr double kThird = 2.0 * std::numbers::pi / 3.0;
+  const TranslatorOptions options =
+      translating({.mechanism = kinematics::delta_on_circle(125.0, 250.0, {0.0, kThird, -kThird}),
+                   .ranges_mm = {}});
+  EXPECT_THAT(translated("G28\nG1 X80 F600\nG1 X-300\n", options),
+              StartsWith("in.gcode:3: the tool cannot be at X-1"));
+  // A line from an unknown place cannot be cut.
+  EXPECT_THAT(translated("G1 X0 Y0 Z5 F600\n", options),
+              StartsWith("in.gcode:1: this move begins at a place that has not been told"));
 }
 
 TEST(TranslateRefuses, OutputsOfUnflex) {
