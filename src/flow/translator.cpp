@@ -89,16 +89,18 @@ Status Translator::carry_over(const gcode::ModalState& before, std::string& text
   if (command_.is('G', 28)) {
     return home(text);
   }
-  if (command_.is('M', 18) || command_.is('M', 84)) {
+  const bool is_alone = event_.warnings.empty() && !command_.has_any("GM");
+  if (is_alone && (command_.is('M', 18) || command_.is('M', 84))) {
     known_.fill(false);
     lost_by_ = fmt::format("M{} in line {}", command_.number, event_.line.number);
     needs_home_ = true;
     text += event_.line.text;
     return {};
   }
-  if (event_.tool || (command_.is('M', 109) && event_.position_lost)) {
+  if (is_alone && (event_.tool || (command_.is('M', 109) && event_.position_lost))) {
     return select_tool(text);
   }
+  tells_feed_ = tells_feed_ || event_.kind == gcode::EventKind::border;
   if (event_.position_lost) {
     return is_motion(command_) || !event_.warnings.empty()
                ? wrong(fmt::format("this line is not understood{}{}; correct it, or take it out",

@@ -74,6 +74,8 @@ class Translator {
   std::string lost_by_ = "the start";  // what the place has not been told since
   bool needs_home_ = false;            // the motors have been off
   ScaledJoints joints_{};              // where the joints are, if the place is known
+  // The printer may have left out the lines before, and with them their F.
+  bool tells_feed_ = false;
   std::vector<Diagnostic> warnings_;
   bool told_of_limits_ = false;
   bool ends_with_newline_ = true;

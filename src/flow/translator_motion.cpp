@@ -141,7 +141,7 @@ Status Translator::filament_alone(std::string& text) {
   }
   const std::int64_t feed = feed_scaled(sliced_.state());
   if (event_.kind != EventKind::move || command_.has('F') ||
-      feed == feed_scaled(written_.state())) {
+      (feed == feed_scaled(written_.state()) && !tells_feed_)) {
     text += event_.line.text;
     return {};
   }
@@ -188,11 +188,12 @@ void Translator::append_lines(const gcode::ModalState& before, bool knows_start,
     const ScaledJoints to = scaled_joints(piece.end_joints_mm);
     const std::int64_t wanted = feed_of(piece, to, knows_start);
     append_motion(text, motion, to, is_cut ? cut_e.word(piece.share_of_e) : motion.e,
-                  wanted != feed ? std::optional(wanted) : std::nullopt);
+                  wanted != feed || tells_feed_ ? std::optional(wanted) : std::nullopt);
     text += i == 0 ? motion.comment : std::string_view{};
     const bool is_last = i + 1 == pieces.size();
     text += motion.ending.empty() && !is_last ? "\n" : motion.ending;
     feed = wanted;
+    tells_feed_ = false;
     joints_ = to;
   }
 }

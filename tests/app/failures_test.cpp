@@ -56,7 +56,7 @@ INSTANTIATE_TEST_SUITE_P(
             {"frobnicate"},
             1,
             "unflex: unknown command 'frobnicate'; there are compensate, batch, verify, inspect, "
-            "filament, printer, identify, tune, hotend, kinematics, study"},
+            "filament, printer, identify, tune, hotend, kinematics, translate, study"},
         Failure{"NoInput", {"compensate"}, 1, "unflex: IN is required; run 'unflex compensate"},
         Failure{"NoOutput", {"compensate", "in.gcode"}, 1, "unflex: where to write? give -o OUT"},
         Failure{"UnknownOption",

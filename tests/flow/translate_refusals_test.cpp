@@ -114,6 +114,16 @@ TEST(TranslateRefuses, HopsOfTheFirmware) {
               StartsWith("in.gcode:4: this line becomes the firmware's own retraction"));
 }
 
+TEST(TranslateRefuses, SeveralCommandsInALine) {
+  for (const std::string line : {"M84 G1 X5", "T0 G1 X5", "M18 M84", "G28 G1 X5", "M106 S1 G1 X5",
+                                 "G4 P1 G0 Z5", "G92 E0 G1 X5", "G90 G1 X5", "M109 S200 G1 X5",
+                                 "G28 {X}", "G28 X{1}", "G1 X{1}", "T{0}", "M84 {X}", "G91 {1}"}) {
+    EXPECT_THAT(refusal("G28\n" + line + "\nG1 X1 Y1 Z1 F600\n", Firmware::rrf),
+                StartsWith("in.gcode:"))
+        << line;
+  }
+}
+
 TEST(TranslateRefuses, LinesThatCannotBeTakenApart) {
   EXPECT_THAT(refusal("G28\nG1 X1 X2 F600\n"), StartsWith("in.gcode:2: a second command"));
   EXPECT_THAT(refusal("G28\nN5 G1 X1 F600\n"), StartsWith("in.gcode:2: the line has a number"));

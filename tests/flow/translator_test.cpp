@@ -101,6 +101,12 @@ TEST(Translator, MakesLinesOfArcs) {
 }
 
 TEST(Translator, GoesOnBehindLabelsOfObjects) {
+  // If the object is cancelled, nobody has told the last line its speed.
+  EXPECT_EQ(on_tripteron("G28\nG1 X10 F600\nEXCLUDE_OBJECT_START NAME=a\nG1 X20\n"
+                         "EXCLUDE_OBJECT_END NAME=a\nG1 X30\nG1 X40\n"),
+            "G28\nG1 X10 Y10 Z10 F1039.23\nEXCLUDE_OBJECT_START NAME=a\n"
+            "G1 X20 Y20 Z20 F1039.23\nEXCLUDE_OBJECT_END NAME=a\nG1 X30 Y30 Z30 F1039.23\n"
+            "G1 X40 Y40 Z40\n");
   EXPECT_EQ(on_tripteron("G28\nG1 X10 F600\nEXCLUDE_OBJECT_START NAME=a\nG1 Y10\n"
                          "EXCLUDE_OBJECT_END NAME=a\nG1 X20\n"),
             "G28\nG1 X10 Y10 Z10 F1039.23\nEXCLUDE_OBJECT_START NAME=a\n"
