@@ -108,7 +108,7 @@ Result<machine::Settings> load_settings(const RunConfig& config, Input& input) {
   if (settings && config.timing_method != TimingMethod::as_set && !settings->is_timing_free()) {
     return fail(ErrorKind::usage, "--timing says how --faster finds the timing; give that too");
   }
-  if (config.command == Command::compensate) {
+  if (config.command == Command::compensate || config.command == Command::translate) {
     return settings.and_then(without_guess);
   }
   return settings;

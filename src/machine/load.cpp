@@ -349,7 +349,10 @@ Result<Settings> finish(Draft draft) {
   note_odd_dampings(draft);
   note_assumed_kinematics(draft);
   note_slow_z_motor(draft);
-  note_unknown_resonances(draft);
+  // They do not matter to a print that is only translated.
+  if (!draft.is_firmware_plain) {
+    note_unknown_resonances(draft);
+  }
   record_origins(draft);
   return draft.settings;
 }

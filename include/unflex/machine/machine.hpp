@@ -432,8 +432,8 @@ struct Sources {
   // If no source names a firmware, take the one that the print was sliced for. If this is false,
   // take the default: many printers are sliced for as if they had another firmware.
   bool firmware_as_sliced = false;
-  // The firmware moves each of X, Y and Z by a motor of its own, whatever kinematics.type says.
-  // Then that type must not be from the firmware's own configuration.
+  // The firmware moves each of X, Y and Z by a motor of its own. Then kinematics.type must not be
+  // from the configuration of the firmware itself, and resonances are not asked for.
   bool is_firmware_plain = false;
 };
 
