@@ -15,6 +15,7 @@
 #include "stream_buffers.hpp"
 #include "unflex/core/errno_text.hpp"
 #include "unflex/core/rewrite_lines.hpp"
+#include "unflex/machine/mode_frame.hpp"
 #include "unflex/report/format.hpp"
 #include "unflex/run/extruded_path.hpp"
 #include "unflex/temperature/temperature.hpp"
@@ -168,13 +169,28 @@ Status check_built(EngineChoice engine) {
   return {};
 }
 
+namespace {
+
+// Ipopt's processes get the windows of X and Y alone.
+Status check_modes(const Job& job) {
+  const std::optional<dynamics::ModeFrame> frame = machine::mode_frame(job.settings);
+  if (job.engine == EngineChoice::ipopt && frame && frame->mode(2)) {
+    return fail(ErrorKind::usage,
+                "--engine ipopt solves X and Y alone, but this machine's modes move the nozzle in "
+                "Z; take the banded engine");
+  }
+  return {};
+}
+
+}  // namespace
+
 Result<report::Report> compensate(const Job& job, Progress& progress) {
   if (const std::optional<Diagnostic>& refusal = job.settings.refusal) {
     return fail(ErrorKind::usage, refusal->place, refusal->message);
   }
-  return check_built(job.check_solver ? EngineChoice::ipopt : job.engine).and_then([&] {
-    return compensate_with(job, engines_of(job), progress);
-  });
+  return check_built(job.check_solver ? EngineChoice::ipopt : job.engine)
+      .and_then([&] { return check_modes(job); })
+      .and_then([&] { return compensate_with(job, engines_of(job), progress); });
 }
 
 Result<report::Report> compensate_with(const Job& job, const Engines& engines, Progress& progress) {

@@ -1,8 +1,9 @@
 #include "text_places.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <string_view>
+
+#include "unflex/core/math.hpp"
 
 namespace unflex::report {
 namespace {
@@ -18,7 +19,7 @@ std::size_t middle_of(const verify::PlaceErrors& places) {
     y_mm += square.y_mm / static_cast<double>(places.squares.size());
   }
   const auto away = [&](const verify::PlaceErrors::Square& square) {
-    return std::hypot(square.x_mm - x_mm, square.y_mm - y_mm);
+    return math::hypot(square.x_mm - x_mm, square.y_mm - y_mm);
   };
   const auto nearest = std::ranges::min_element(places.squares, {}, away);
   return static_cast<std::size_t>(nearest - places.squares.begin());

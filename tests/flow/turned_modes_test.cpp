@@ -100,7 +100,7 @@ TEST(BeltsThatDiffer, MakeTheSameTextForAnyNumberOfWorkers) {
 }
 
 // Tool of 300 g, carriages of 200 g, drives of 40 N/mm: X moves the nozzle in Z.
-TEST(ATripteron, IsCompensatedInZToo) {
+Overrides tripteron_overrides() {
   Overrides tripteron = {"kinematics.type=tripteron", "dynamics.of=masses",
                          "dynamics.tool_mass_g=300", "dynamics.freq_error=0"};
   for (const char* const motor : {"a", "b", "c"}) {
@@ -109,6 +109,11 @@ TEST(ATripteron, IsCompensatedInZToo) {
       tripteron.push_back(std::string("dynamics.") + motor + key);
     }
   }
+  return tripteron;
+}
+
+TEST(ATripteron, IsCompensatedInZToo) {
+  const Overrides tripteron = tripteron_overrides();
   const Made whole = made(tripteron);
   const verify::Measured& measured = whole.report.measured;
   ASSERT_TRUE(measured.compensated.height && measured.uncompensated.height);
@@ -118,6 +123,16 @@ TEST(ATripteron, IsCompensatedInZToo) {
   EXPECT_GT(measured.uncompensated.height->rms_mm, 1e-3);
   EXPECT_NE(whole.text.find(" Z0."), std::string::npos);
   EXPECT_EQ(made(tripteron, 3).text, whole.text);
+}
+
+TEST(ATripteron, IsNotForIpopt) {
+  const JobFolder folder(print(), tripteron_overrides());
+  Job job = folder.job();
+  job.engine = EngineChoice::ipopt;
+  SilentProgress progress;
+  const Result<report::Report> report = compensate(job, progress);
+  ASSERT_FALSE(report);
+  EXPECT_NE(to_string(report.error()).find("take the banded engine"), std::string::npos);
 }
 
 }  // namespace
