@@ -64,9 +64,6 @@ Status Translator::translate(const gcode::Line& line, std::string& text) {
   const gcode::ModalState before = sliced_.state();
   event_.line = line;
   sliced_.interpret(event_);
-  if (line.content().starts_with(kJointsMark)) {
-    return wrong("this file was already translated; give the file as it was sliced");
-  }
   gcode::parse(event_.line.content(), command_);
   if (const auto why = why_unsafe(command_)) {
     return wrong(*why);

@@ -33,6 +33,12 @@ Error compensated_already(const std::string& file, std::size_t line) {
 }
 
 Status check_as_sliced(const gcode::Line& line, const std::string& file) {
+  if (line.content().starts_with(kJointsMark)) {
+    return fail(
+        ErrorKind::input, {file, line.number},
+        "this file was already translated by unflex, and its places are of joints; give the "
+        "file as it was sliced");
+  }
   if (!is_own_comment(line.content())) {
     return {};
   }

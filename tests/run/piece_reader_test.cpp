@@ -166,6 +166,11 @@ TEST(PieceReader, RefusesWhatUnflexWrote) {
   EXPECT_THAT(reading.error, HasSubstr("in.gcode:5: this file was already compensated"));
 }
 
+TEST(PieceReader, RefusesPlacesOfJoints) {
+  const Reading reading(std::string(kKnown) + "G1 X5\n; unflex joints: 1 moves\n");
+  EXPECT_THAT(reading.error, HasSubstr("in.gcode:5: this file was already translated by unflex"));
+}
+
 TEST(PieceReader, HandsLongStretchesWithoutMotionOutInPortions) {
   std::string text = "G28\n";
   for (int i = 0; i < 20000; ++i) {
