@@ -271,7 +271,10 @@ double accel_for_z_mm_s2(const Run& run, const LineRules& rules) {
 
 LineRules rules_for(const Run& run, const EmitOptions& options) {
   LineRules rules = options.lines;
-  rules.tolerance_mm *= run.tolerance_share;
+  // Lines are cut for each axis by itself. Where Z swings with X, the error that a line causes on
+  // one axis shows on the other, too.
+  constexpr double kWhereZSwings = 0.5;
+  rules.tolerance_mm *= run.tolerance_share * (run.base->above ? kWhereZSwings : 1.0);
   rules.burst_lines = static_cast<int>(run.limits_share * rules.burst_lines);
   rules.max_accel_mm_s2 = run.limits_share * rules.max_accel_mm_s2 - accel_for_z_mm_s2(run, rules);
   return rules;

@@ -111,7 +111,7 @@ compensate::AxisSetup setup_of_mode(const dynamics::Mode& mode, const machine::S
 
 // The share of the firmware's acceleration of Z that the base may ask for. The rest is for lines,
 // which change their speed at once.
-constexpr double kShareOfZ = 0.5;
+constexpr double kShareOfZ = 0.9;
 
 // Sets X and Y of the setup to the modes of the machine, and the third mode if Z is not rigid.
 // Where the base may go is not limited: verification sees to it that it stays within the travel.
