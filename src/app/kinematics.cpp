@@ -11,8 +11,7 @@
 #include <vector>
 
 #include "inputs.hpp"
-#include "results.hpp"
-#include "workspace.hpp"
+#include "print_work.hpp"
 
 namespace unflex::app {
 namespace {
@@ -85,15 +84,7 @@ Result<ExitCode> run_on_joints(const RunConfig& config, Console& console) {
   if (!space) {
     return tl::unexpected(space.error());
   }
-  const Result<flow::Job> job = job_of(config, *space);
-  if (!job) {
-    return tl::unexpected(job.error());
-  }
-  const Result<flow::PrintInJoints> print = with_progress(
-      config, [&](Progress& progress) { return flow::print_in_joints(*job, progress); });
-  if (const Status unchanged = check_inputs(*space); !unchanged) {
-    return tl::unexpected(unchanged.error());
-  }
+  const Result<flow::PrintInJoints> print = work_on_print(config, *space, flow::print_in_joints);
   if (!print) {
     return tl::unexpected(print.error());
   }

@@ -10,14 +10,13 @@
 #include "inspection.hpp"
 #include "machine_records.hpp"
 #include "outputs.hpp"
+#include "print_work.hpp"
 #include "record_densities.hpp"
-#include "results.hpp"
 #include "unflex/core/axes.hpp"
 #include "unflex/identify/axis_model.hpp"
 #include "unflex/platform/names.hpp"
 #include "unflex/study/study_machines.hpp"
 #include "unflex/study/truth.hpp"
-#include "workspace.hpp"
 
 namespace unflex::app {
 namespace {
@@ -186,15 +185,10 @@ Result<ExitCode> run_machines(const RunConfig& config, Console& console) {
     }
     known.push_back({candidate.name, std::move(*settings), map_axes(machine_axis, candidate.axes)});
   }
-  const Result<flow::Job> job = job_of(config, *space);
-  if (!job) {
-    return tl::unexpected(job.error());
-  }
-  Result<study::MachinesOutcome> outcome = with_progress(
-      config, [&](Progress& progress) { return study::study_machines(*job, known, progress); });
-  if (const Status unchanged = check_inputs(*space); !unchanged) {
-    return tl::unexpected(unchanged.error());
-  }
+  Result<study::MachinesOutcome> outcome =
+      work_on_print(config, *space, [&](const flow::Job& job, Progress& progress) {
+        return study::study_machines(job, known, progress);
+      });
   if (!outcome) {
     return tl::unexpected(outcome.error());
   }

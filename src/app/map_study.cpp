@@ -2,9 +2,8 @@
 
 #include "inspection.hpp"
 #include "outputs.hpp"
-#include "results.hpp"
+#include "print_work.hpp"
 #include "unflex/study/study_map.hpp"
-#include "workspace.hpp"
 
 namespace unflex::app {
 
@@ -13,15 +12,7 @@ Result<ExitCode> run_map_study(const RunConfig& config, Console& console) {
   if (!space) {
     return tl::unexpected(space.error());
   }
-  const Result<flow::Job> job = job_of(config, *space);
-  if (!job) {
-    return tl::unexpected(job.error());
-  }
-  Result<study::MapOutcome> outcome =
-      with_progress(config, [&](Progress& progress) { return study::study_map(*job, progress); });
-  if (const Status unchanged = check_inputs(*space); !unchanged) {
-    return tl::unexpected(unchanged.error());
-  }
+  Result<study::MapOutcome> outcome = work_on_print(config, *space, study::study_map);
   if (!outcome) {
     return tl::unexpected(outcome.error());
   }

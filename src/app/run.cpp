@@ -19,6 +19,7 @@
 #include "machines.hpp"
 #include "map_study.hpp"
 #include "print_run.hpp"
+#include "print_work.hpp"
 #include "printer_init.hpp"
 #include "printer_keys.hpp"
 #include "printer_line_test.hpp"
@@ -49,15 +50,7 @@ Result<ExitCode> run_inspect(const RunConfig& config, Console& console) {
   if (!space) {
     return tl::unexpected(space.error());
   }
-  const Result<flow::Job> job = job_of(config, *space);
-  if (!job) {
-    return tl::unexpected(job.error());
-  }
-  Result<flow::Inspection> inspection =
-      with_progress(config, [&](Progress& progress) { return flow::inspect(*job, progress); });
-  if (const Status unchanged = check_inputs(*space); !unchanged) {
-    return tl::unexpected(unchanged.error());
-  }
+  Result<flow::Inspection> inspection = work_on_print(config, *space, flow::inspect);
   if (!inspection) {
     return tl::unexpected(inspection.error());
   }

@@ -115,7 +115,8 @@ void keep_z_accel(double most_mm_s2, double period_s, dynamics::AxisTrajectory& 
   if (std::ranges::min(needed) >= 1.0) {
     return;
   }
-  // The least share that is needed within the reach, and its mean within the reach, twice.
+  // The least share that is needed within the reach. Its mean within the reach, with weights that
+  // fall towards both ends, changes slowly.
   std::vector<double> share(nodes);
   for (std::size_t k = 0; k < nodes; ++k) {
     const auto [first, last] = around(k);

@@ -22,8 +22,7 @@ inline constexpr std::array kDynamicsKeys = {
     Key{"dynamics.x.map", &axis_setting<&S::dynamics, 0, &D::map>, kAny, "",
         "Frequencies along X at some places of the nozzle: [[dynamics.x.map]] with along, \"x\", "
         "\"y\" or \"z\", and the lists at_mm and freq_hz; maps along several directions multiply "
-        "as "
-        "shares of freq_hz",
+        "as shares of freq_hz",
         "the same everywhere"},
     Key{"dynamics.x.mode", &axis_setting<&S::dynamics, 0, &D::modes>, kAny, "",
         "Modes along X, in place of freq_hz and damping_ratio: [[dynamics.x.mode]] with freq_hz, "
@@ -73,8 +72,7 @@ inline constexpr std::array kDynamicsKeys = {
     Key{"dynamics.y.map", &axis_setting<&S::dynamics, 1, &D::map>, kAny, "",
         "Frequencies along Y at some places of the nozzle: [[dynamics.y.map]] with along, \"x\", "
         "\"y\" or \"z\", and the lists at_mm and freq_hz; maps along several directions multiply "
-        "as "
-        "shares of freq_hz",
+        "as shares of freq_hz",
         "the same everywhere"},
     Key{"dynamics.y.mode", &axis_setting<&S::dynamics, 1, &D::modes>, kAny, "",
         "Modes along Y, in place of freq_hz and damping_ratio: [[dynamics.y.mode]] with freq_hz, "

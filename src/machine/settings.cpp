@@ -17,6 +17,7 @@
 #include "unflex/core/firmware_spec.hpp"
 #include "unflex/core/math.hpp"
 #include "unflex/core/xy.hpp"
+#include "unflex/dynamics/frequency_field.hpp"
 #include "unflex/machine/machine.hpp"
 #include "validate.hpp"
 #include "variants.hpp"
@@ -268,13 +269,7 @@ double Settings::base_max_accel_mm_s2(double asked_mm_s2) const {
 }
 
 double FrequencyMap::hz_at(double place_mm) const {
-  const auto above = std::ranges::upper_bound(at_mm, place_mm);
-  const auto next = static_cast<std::size_t>(above - at_mm.begin());
-  if (next == 0 || next == at_mm.size()) {
-    return next == 0 ? freq_hz.front() : freq_hz.back();
-  }
-  return std::lerp(freq_hz[next - 1], freq_hz[next],
-                   (place_mm - at_mm[next - 1]) / (at_mm[next] - at_mm[next - 1]));
+  return dynamics::between_places(at_mm, freq_hz, place_mm);
 }
 
 // f = f₀ √(m₀ / (m₀ + m)): the belt stays as stiff while the mass on it grows.

@@ -59,9 +59,9 @@ dynamics::ShaperPulses pulses_of(const machine::Settings& settings, double freq_
 }
 
 // How much more than an axis a mode asks of the motors that move it: β₀ and β₁ move X and Y by Φ.
-double times_by_modes(const std::optional<dynamics::ModeFrame>& frame) {
+double times_by_modes(const dynamics::ModeFrame* frame) {
   double most = 1.0;
-  for (std::size_t mode = 0; frame && mode < XY::kCount; ++mode) {
+  for (std::size_t mode = 0; frame != nullptr && mode < XY::kCount; ++mode) {
     most =
         std::max(most, std::abs(frame->to_axes()[0][mode]) + std::abs(frame->to_axes()[1][mode]));
   }
@@ -117,7 +117,7 @@ constexpr double kShareOfZ = 0.9;
 // Where the base may go is not limited: verification sees to it that it stays within the travel.
 void take_modes(const dynamics::ModeFrame& frame, const machine::Settings& settings,
                 compensate::Setup& setup) {
-  const double times = times_by_modes(frame);
+  const double times = times_by_modes(&frame);
   for (std::size_t i = 0; i < XY::kCount; ++i) {
     compensate::AxisSetup axis = setup_of_mode(*frame.mode(i), settings);
     axis.limits = setup[i].limits;
@@ -177,9 +177,11 @@ constexpr double kSeen_mm = 10e-3;
 
 // Whether the nozzle still swings from the motion before when the run begins.
 bool begins_swinging(const Piece& run, const dynamics::NozzleXY& nozzle,
-                     const machine::Settings& settings) {
+                     const compensate::Setup& setup, const machine::Settings& settings) {
   verify::NozzleModel model{machine::nozzle_axes(settings)};
-  model.frame = machine::mode_frame(settings);
+  if (setup.frame) {
+    model.frame = *setup.frame;
+  }
   return run.begins_run() &&
          verify::swing_mm(nozzle, run.moves.front().segment.start_mm, model) >= kSeen_mm;
 }
@@ -278,12 +280,11 @@ RunSetup setup_for(const compensate::Setup& setup, const Piece& run,
         std::max(result.asked_accel_mm_s2, std::round(planner::asked_accel_mm_s2(move)));
   }
   // To end a swing takes all that the motors give.
-  const bool swings = begins_swinging(run, nozzle, settings);
+  const bool swings = begins_swinging(run, nozzle, setup, settings);
   result.accel = {planned_base_accel_mm_s2(settings, result.asked_accel_mm_s2, !swings),
                   settings.emit_accel_mm_s2(result.asked_accel_mm_s2)};
   result.accel_by_lines_mm_s2 = accel_by_lines_mm_s2(settings);
-  const double gain =
-      settings.motors().gain_of_xy() * times_by_modes(machine::mode_frame(settings));
+  const double gain = settings.motors().gain_of_xy() * times_by_modes(setup.frame.get());
   for_each_axis(
       [&](compensate::AxisSetup& axis) {
         axis.limits.max_accel_mm_s2 = result.accel.base_mm_s2 / gain;

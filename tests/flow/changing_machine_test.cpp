@@ -6,16 +6,16 @@
 #include <string>
 #include <vector>
 
-#include "jobs.hpp"
+#include "made_prints.hpp"
 #include "paths.hpp"
-#include "unflex/core/progress.hpp"
-#include "unflex/flow/flow.hpp"
 
 namespace unflex::flow {
 namespace {
 
 using testing::complaints;
 using testing::JobFolder;
+using testing::Made;
+using testing::rms_mm;
 
 // The print lays half a gram. On a bed of as little as 2 g its frequency falls by a tenth.
 const std::vector<std::string> kExact = {"dynamics.freq_error=0", "dynamics.y.freq_hz=38"};
@@ -31,23 +31,8 @@ std::string print() {
   return testing::read_file(std::filesystem::path(test_paths::kData) / "pipeline_star.gcode");
 }
 
-struct Made {
-  report::Report report;
-  std::string text;
-};
-
 Made made(const std::vector<std::string>& overrides, unsigned workers = 2) {
-  const JobFolder folder(print(), overrides);
-  SilentProgress progress;
-  const Result<report::Report> report = compensate(folder.job(workers), progress);
-  EXPECT_TRUE(report.has_value()) << to_string(report.error());
-  EXPECT_EQ(report->violation_count, 0U) << complaints(*report);
-  EXPECT_EQ(report->runs.fallback, 0U) << complaints(*report);
-  return {report.value_or(report::Report{}), folder.output()};
-}
-
-double rms_mm(const report::Report& report) {
-  return report.measured.compensated.extruding.contour_rms_mm;
+  return testing::made(print(), overrides, workers);
 }
 
 TEST(AMovingBed, IsCompensatedForItsMassAtEachRun) {

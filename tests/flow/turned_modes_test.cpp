@@ -4,15 +4,14 @@
 #include <string>
 #include <vector>
 
-#include "jobs.hpp"
-#include "unflex/core/progress.hpp"
-#include "unflex/flow/flow.hpp"
+#include "made_prints.hpp"
 
 namespace unflex::flow {
 namespace {
 
-using testing::complaints;
 using testing::JobFolder;
+using testing::Made;
+using testing::rms_mm;
 using Overrides = std::vector<std::string>;
 
 // A CoreXY with belts of 40 and 36 N/mm, whose modes are at 80.2 and 56.5 Hz, 3° and 6° off X and
@@ -45,23 +44,8 @@ std::string print() {
   return text;
 }
 
-struct Made {
-  report::Report report;
-  std::string text;
-};
-
-Made made(const Overrides& overrides, unsigned workers = 2) {
-  const JobFolder folder(print(), overrides);
-  SilentProgress progress;
-  const Result<report::Report> report = compensate(folder.job(workers), progress);
-  EXPECT_TRUE(report.has_value()) << to_string(report.error());
-  EXPECT_EQ(report->violation_count, 0U) << complaints(*report);
-  EXPECT_EQ(report->runs.fallback, 0U) << complaints(*report);
-  return {report.value_or(report::Report{}), folder.output()};
-}
-
-double rms_mm(const report::Report& report) {
-  return report.measured.compensated.extruding.contour_rms_mm;
+Made made(const std::vector<std::string>& overrides, unsigned workers = 2) {
+  return testing::made(print(), overrides, workers);
 }
 
 TEST(BeltsThatDiffer, AreCompensatedAlongTheirModes) {

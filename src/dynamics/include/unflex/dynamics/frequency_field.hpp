@@ -8,6 +8,7 @@
 
 #include <cmath>
 #include <map>
+#include <span>
 #include <vector>
 
 #include "unflex/core/axes.hpp"
@@ -17,8 +18,13 @@
 
 namespace unflex::dynamics {
 
-// Shares at some places of one direction. They are linear between two places, and constant beyond
-// the first and the last one. Without places the share is 1.
+// The value at a place, of values at some places, one or more, which increase: linear between two
+// places, and constant beyond the first and the last one.
+[[nodiscard]] double between_places(std::span<const double> at_mm, std::span<const double> values,
+                                    double place_mm);
+
+// Shares at some places of one direction, as between_places() has them. Without places the share is
+// 1.
 struct SharesAlong {
   std::vector<double> at_mm;  // increasing
   std::vector<double> share;  // one for each of at_mm
